@@ -378,6 +378,17 @@ def test_no_faces_are_missed_by_all(accelerator: Any, vertices: Any) -> None:
     assert isinstance(found, AllHits) and not len(found.t) and not found.counts.any()
 
 
+@cases("scale", [1e-300, 1e-160, 1.0, 1e160, 1e300])
+@cases("mirror", [1, -1])
+def test_maps_of_any_size_keep_outside_outside(scale: float, mirror: int) -> None:
+    mesh = Mesh(BOX.vertices, BOX.faces, normals=BOX.vertices - 0.5)
+    moved = mesh.transformed(np.diag([mirror * scale, scale, scale, 1.0]))
+    expected = mesh.transformed(np.diag([mirror, 1.0, 1.0, 1.0]))
+    assert np.array_equal(moved.faces, expected.faces) and moved.normals is not None and expected.normals is not None
+    # Three products and a division of numbers near one.
+    np.testing.assert_allclose(moved.normals, expected.normals, rtol=4e-15, atol=1e-15)
+
+
 # --- Hits, Mesh and their sizes -------------------------------------------------------------------------------
 
 
@@ -394,6 +405,12 @@ class TestWhatIsNoMesh:
     def test_concatenate(self, bad: Any) -> None:
         with pytest.raises(MeshError, match=r"^pot: meshes: expected an iterable of Mesh, got .* in row 1"):
             Mesh.concatenate([BOX, bad], name="pot")
+
+
+@cases("bad", [None, 3, "x", BOX, np.array(3)])
+def test_concatenate_takes_meshes_only(bad: Any) -> None:
+    with pytest.raises(MeshError, match=r"^meshes: expected an iterable of Mesh, got"):
+        Mesh.concatenate(bad if bad is not BOX else [BOX, None])
 
 
 # --- files ----------------------------------------------------------------------------------------------------
@@ -430,6 +447,13 @@ def test_colours_beyond_float32_are_refused_without_a_warning(tmp_path: Path) ->
     for name in ("a.ply", "a.obj"):
         with pytest.raises(MeshError, match=r"colors: expected finite values, got .* in row 0"):
             load_mesh(tmp_path / name)
+
+
+@cases("separator", ["\x0b", "\x0c", "\x1c", "\x85", "\u2028", "\u2029"])
+def test_separators_within_a_comment_end_no_line(tmp_path: Path, separator: str) -> None:
+    text = f"# a{separator}b\ng c{separator}d\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    (tmp_path / "a.obj").write_text(text, encoding="utf-8")
+    assert load_mesh(tmp_path / "a.obj").faces.tolist() == [[0, 1, 2]]
 
 
 @cases("bad", [None, 1, 0, "yes", [], np.True_])
@@ -483,6 +507,20 @@ def test_settings_of_render(name: str, bad: Any) -> None:
     assert "ambiguous" not in str(caught.value)
 
 
+@cases("bad", [None, "scene.toml", 3, {"camera": {}}, BOX, np.ones(3)])
+def test_render_takes_scenes(bad: Any) -> None:
+    with pytest.raises(ValueError, match=r"^scene: expected a Scene or a PreparedScene, got"):
+        render(bad, resolution=(4, 4))
+    with pytest.raises(ValueError, match=r"^scene: expected a Scene, got"):
+        needs_of(bad)
+
+
+@cases("bad", [-1, 1.5, "1", True, np.nan, [1]])
+def test_bounces_of_needs_of(bad: Any) -> None:
+    with pytest.raises(ValueError, match=r"^max_depth: expected an integer >= 0 or None, got"):
+        needs_of(SCENE, bad)
+
+
 PREPARED = renderer.prepare(SCENE)
 
 
@@ -493,6 +531,12 @@ PREPARED = renderer.prepare(SCENE)
 def test_what_a_prepared_scene_cannot_change_is_refused(name: str, bad: Any) -> None:
     with pytest.raises(ValueError, match=rf"^{name}: expected .*, got "):
         render(PREPARED, **{"resolution": (4, 4), name: bad})
+
+
+@pytest.mark.parametrize("bad", [None, "scene.toml", PREPARED], ids=lambda b: type(b).__name__)
+def test_prepare_takes_scenes(bad: Any) -> None:
+    with pytest.raises(ValueError, match=r"^scene: expected a Scene, got"):
+        renderer.prepare(bad)
 
 
 # --- scenes from Python ---------------------------------------------------------------------------------------

@@ -267,6 +267,12 @@ def test_a_far_origin_at_a_tiny_mesh_is_refused_without_a_warning() -> None:
         octree.closest_hit([[1e300, 0, 0]], [[0, 0, 1]])
 
 
+@pytest.mark.parametrize("kind", [complex, str])
+def test_no_rays_of_a_wrong_type_are_refused(kind: type) -> None:
+    with pytest.raises(ValueError, match=r"^origins: expected real numbers"):
+        Octree(*TRIANGLE).closest_hit(np.empty((0, 3), kind), np.empty((0, 3)))
+
+
 def test_no_hit_comes_before_t_min() -> None:
     octree = Octree(np.array(TRIANGLE[0]) * 2.0**1000, TRIANGLE[1])
     assert not octree.any_hit([[2.0**998, 2.0**998, 1e-300]], [[0, 0, -1]], 1e-299).any()

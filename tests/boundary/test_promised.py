@@ -175,6 +175,13 @@ def test_the_examples_of_all_docstrings_hold() -> None:
     assert runner.tries > 50 and runner.failures == 0
 
 
+@pytest.mark.judges("AllHits.ray")
+def test_rays_of_several_dimensions_are_counted_in_c_order() -> None:
+    origins = np.array([[[0.0, 0.0, 3.0], [9.0, 0.0, 3.0]], [[0.1, 0.0, 3.0], [0.2, 0.0, 3.0]]])
+    found = Octree.from_mesh(icosphere(2)).all_hits(origins, [0.0, 0.0, -1.0], max_hits=1)
+    assert found.ray.tolist() == [0, 2, 3] and found.counts.tolist() == [[1, 0], [1, 1]]
+
+
 @pytest.mark.judges("Octree.all_hits")
 def test_memory_of_all_hits_grows_with_what_is_found() -> None:
     vertices = np.tile([[-1.0, -1.0, 0.0], [2.0, -1.0, 0.0], [-1.0, 2.0, 0.0]], (400, 1))
@@ -222,6 +229,19 @@ def test_a_refit_keeps_what_belongs_to_vertices() -> None:
     octree.refit(mesh.vertices * 2.0)
     for name in ("normals", "colors", "texcoords"):
         assert np.array_equal(getattr(octree.mesh, name), getattr(full, name))
+
+
+@pytest.mark.judges("Mesh")
+def test_meshes_compare_and_hash_by_identity() -> None:
+    first, second = icosphere(0), icosphere(0)
+    assert first != second and len({first, second, first}) == 2
+
+
+@pytest.mark.judges("Mesh.is_closed")
+def test_closed_is_told_by_index() -> None:
+    mesh = icosphere(0)
+    soup = Mesh(mesh.triangles.reshape(-1, 3), np.arange(3 * len(mesh.faces)).reshape(-1, 3))
+    assert mesh.is_closed() and not soup.is_closed()
 
 
 # Meshes
@@ -431,6 +451,21 @@ def test_what_the_command_is_told_is_handed_on_and_the_rest_left_to_the_library(
     for options, said in zip(told, expected, strict=True):
         assert {name: options[name] for name in said} == said
     assert [path.name for path in tmp_path.iterdir()] == ["out.png"]
+
+
+@pytest.mark.judges("octree-render view --host", "octree-render view --port", "octree-render view scene")
+def test_the_command_shows_a_scene_on_this_machine_at_any_free_port(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told: list[dict[str, Any]] = []
+
+    def noting(scene: Any, **options: Any) -> Any:
+        told.append(options)
+        raise ValueError("enough is known")
+
+    monkeypatch.setattr(import_module("renderer.viewer.view"), "view", noting)
+    assert main(["view", str(STAIRS)]) == main(["view", str(STAIRS), "--host", "::1", "--port", "8123"]) == 2
+    assert [(options["host"], options["port"]) for options in told] == [("127.0.0.1", 0), ("::1", 8123)]
 
 
 @pytest.mark.judges("octree-render info --split")

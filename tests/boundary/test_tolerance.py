@@ -52,6 +52,13 @@ class TestRays:
         assert hits.points.tolist() == [0.0, 0.0, 1.0] and hits.normals.shape == (3,)
         assert BALL.any_hit([0, 0, 3], [0, 0, -1]).shape == BALL.count_hits([0, 0, 3], [0, 0, -1]).shape == ()
 
+    def test_masked_values_are_refused_and_a_mask_of_none_is_not(self) -> None:
+        masked = np.ma.masked_greater(np.abs(MANY), 1.5)
+        with pytest.raises(ValueError, match=r"^origins: expected no masked values, got \d+"):
+            BALL.closest_hit(masked, MANY)
+        free = np.ma.masked_greater(np.abs(MANY), 1e9)
+        assert len(BALL.closest_hit(free, MANY).t) == 20
+
     def test_columns_of_objects_that_are_numbers_are_numbers(self) -> None:
         """As pandas gives its nullable columns: Python numbers, and where one is missing something that is none."""
         np.testing.assert_array_equal(BALL.closest_hit(MANY.astype(object), MANY).t, BALL.closest_hit(MANY, MANY).t)

@@ -68,6 +68,20 @@ def test_constants_compile_a_kernel_once():
     assert len(power.piece.overloads) == 1
 
 
+def test_what_python_does_not_call_is_not_compiled_for_it():
+    @kernel
+    def below(x):
+        return x + 1
+
+    @kernel
+    def above(x):
+        return below(x) + 1
+
+    assert above(1) == 3
+    assert "entry" not in vars(below) and "piece" in vars(above)
+    assert below(1) == 2 and below.__name__ == "below"
+
+
 def test_a_kernel_that_cannot_be_compiled_says_so_each_time():
     @kernel
     def wrong(x):

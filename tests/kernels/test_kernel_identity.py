@@ -1,6 +1,7 @@
 """Whose kernel a kept kernel is: never that of other sources, another function of its name, or other values."""
 
 import os
+import shutil
 import zipapp
 import zipfile
 
@@ -81,6 +82,15 @@ print(make(2)(10), make(3)(10), make(2)(10))
     assert not list(package.parent.glob("__pycache__/mine.*.kernel"))
 
 
+def test_kernels_of_no_file_are_not_kept(package):
+    """Every ``python -c`` is called <string>."""
+    for step in (1, 200):
+        script = "from renderer.jit.decorators import _decorated as d\n"
+        script += f"exec('def f(x): return x + {step}')\nprint(d(f, False)(1))"
+        assert run(package, script) == [str(1 + step)]
+    assert not list(package.parent.rglob("*.kernel"))
+
+
 @pytest.mark.parametrize("folder", ["locked/cache", "n" * 300])
 @pytest.mark.parametrize("variable", ["HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR", "OCTREE_RENDERER_KERNELS"])
 def test_a_folder_that_may_not_be_looked_at_counts_as_absent(package, tmp_path, variable, folder):
@@ -103,6 +113,24 @@ def test_a_relative_cache_folder_stays_where_it_was_when_the_process_moves(packa
     assert run(package, script + RUN, NUMBA_CACHE_DIR="kept") == COMPILED
     assert run(package, script + RUN, NUMBA_CACHE_DIR="kept") == LOADED
     assert not list((tmp_path / "other").iterdir())
+
+
+def test_a_source_that_is_no_utf_8_is_read_all_the_same(package):
+    path = package.parent / "latin.py"
+    path.write_bytes(
+        b"# -*- coding: latin-1 -*-\n# \xe9t\xe9\n"
+        b"from renderer.jit.decorators import kernel\n@kernel\ndef one(): return 1\n"
+    )
+    assert run(package, "import latin; print(latin.one())") == ["1"]
+
+
+def test_a_path_that_is_no_text_is_a_path_like_any_other(tmp_path):
+    odd = tmp_path / os.fsdecode(b"b\xff")
+    odd.mkdir()
+    package = write_package(odd)
+    assert run(package) == COMPILED
+    assert run(package) == LOADED
+    shutil.rmtree(odd)
 
 
 def test_numba_without_its_compiler_is_said_in_one_line(package):

@@ -4,14 +4,15 @@ import os
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import llvmlite.binding as llvm
 import pytest
 from cases import cases
 from kernel_package import COMPILED, LOADED, MIDDLE, RUN, UPPER, bottom_of, run, start, write_package
 
-from renderer.jit.cache import runnable_levels
-from renderer.jit.levels import FEATURES, LEVELS
+from renderer.jit.cache import _user_cache, _versions, runnable_levels
+from renderer.jit.levels import FEATURES, LEVELS, lacking
 
 TELL = """
 import logging, sys
@@ -56,6 +57,14 @@ def test_another_compiler_version_shows(package, pretend):
     assert run(package, pretend + RUN) == COMPILED
     assert run(package, pretend + RUN) == LOADED
     # And does not take what it made from the first one, which may be used in turn.
+    assert run(package) == LOADED
+
+
+def test_another_processor_shows(package):
+    assert run(package) == COMPILED
+    generic = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+    assert run(package, **generic) == COMPILED
+    assert run(package, **generic) == LOADED
     assert run(package) == LOADED
 
 
@@ -145,6 +154,13 @@ def test_what_cannot_be_written_is_still_read(package, tmp_path, own):
         assert run(package, READ_ONLY + RUN, **chosen, **home) == LOADED
 
 
+def test_without_a_home_kernels_are_compiled(package, tmp_path):
+    (package / "__pycache__").touch()
+    script = "import os\nos.environ.pop('HOME', None)\nimport pathlib\n"
+    script += "def no(*a): raise RuntimeError('Could not determine home directory.')\npathlib.Path.home = no\n"
+    assert run(package, script + RUN, XDG_CACHE_HOME="") == COMPILED
+
+
 def test_a_full_disk_stops_nothing_and_is_said_once(package):
     full = """
 import errno, renderer.jit.cache as store
@@ -203,6 +219,20 @@ def test_a_machine_runs_the_levels_whose_features_it_has(monkeypatch, lacks, tri
     assert runnable_levels.__wrapped__() == levels
 
 
+@cases(
+    ("has", "level", "lacks"),
+    [
+        ("x86-64-v2", "x86-64-v2", []),
+        ("x86-64-v2", "x86-64-v3", ["avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"]),
+        ("x86-64-v3", "x86-64-v4", ["avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"]),
+        ("x86-64-v4", "aarch64", ["neon"]),
+    ],
+)
+def test_a_level_lacks_what_the_psabi_has_in_it_beyond_the_machine(monkeypatch, has, level, lacks):
+    monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: dict.fromkeys(FEATURES[has], True))
+    assert lacking(level) == lacks
+
+
 @pytest.fixture(scope="module")
 def ahead(tmp_path_factory):
     """The kernels of the package for a level that this machine runs, compiled once where another copy of it is."""
@@ -249,3 +279,18 @@ def test_a_pipe_in_the_place_of_a_kernel_is_not_waited_for(package):
     path.unlink()
     os.mkfifo(path)
     assert run(package) == COMPILED
+
+
+@pytest.mark.parametrize(
+    ("system", "folder"), [("linux", ".cache"), ("darwin", "Library/Caches"), ("win32", "AppData/Local")]
+)
+def test_the_user_s_own_folder_is_where_each_system_has_it(monkeypatch, tmp_path, system, folder):
+    for name in ("XDG_CACHE_HOME", "LOCALAPPDATA"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(sys, "platform", system)
+    monkeypatch.setattr(Path, "home", lambda: tmp_path)
+    assert _user_cache() == tmp_path / folder
+
+
+def test_kernels_of_one_python_are_not_those_of_another():
+    assert sys.implementation.cache_tag and sys.implementation.cache_tag in _versions()

@@ -30,6 +30,12 @@ def chain(length):
     return {"nodes": [*({"children": [i + 1]} for i in range(length)), {"mesh": 0}]}
 
 
+def test_a_plain_file_and_a_chain_of_some_nodes_load(tmp_path):
+    assert len(load_mesh(glb(tmp_path, {})).faces) == 1
+    assert len(load_mesh(glb(tmp_path, chain(255))).faces) == 1
+    assert len(load_mesh(glb(tmp_path, {"nodes": [{"children": [1, 2]}, {"mesh": 0}, {"mesh": 0}]})).faces) == 2
+
+
 def test_of_thousands_of_primitives_none_is_lost_and_they_keep_their_order(tmp_path):
     """trimesh names their nodes at random: of 3,000 it lost one now and then, of 20,000 ten each time."""
     count = 20_000
@@ -100,6 +106,10 @@ def test_weights_that_move_nothing_are_taken(tmp_path):
 def test_required_extensions_that_may_change_triangles_are_refused(tmp_path, extension):
     with pytest.raises(MeshError, match=f"got the extension {extension}"):
         load_mesh(glb(tmp_path, {"extensionsRequired": [extension]}))
+
+
+def test_required_extensions_of_materials_change_no_triangle(tmp_path):
+    assert len(load_mesh(glb(tmp_path, {"extensionsRequired": ["KHR_materials_unlit"]})).faces) == 1
 
 
 def test_bytes_in_another_file_are_refused_by_name(tmp_path):

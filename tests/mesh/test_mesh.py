@@ -194,6 +194,26 @@ def test_transformed_keeps_outside_outside(seed: int, mirror: bool) -> None:
     np.testing.assert_allclose(moved.normals, gradient, atol=1e-12)  # condition number at most 16
 
 
+def test_transformed_keeps_the_rest() -> None:
+    mesh = Mesh(**TRIANGLE, colors=np.eye(3), texcoords=[[0, 0], [1, 0], [0, 1]], name="pot")  # type: ignore[arg-type]
+    moved = mesh.transformed(affine(np.eye(3), (1, 2, 3)))
+    assert moved.vertices.tolist() == [[1, 2, 3], [2, 2, 3], [1, 3, 3]]
+    assert moved.name == "pot" and np.array_equal(moved.colors, mesh.colors)  # type: ignore[arg-type]
+    assert np.array_equal(moved.texcoords, mesh.texcoords)  # type: ignore[arg-type]
+
+
+def test_transformed_may_flatten() -> None:
+    mesh = Mesh(**TRIANGLE, normals=[[0, 0, 1]] * 3)  # type: ignore[arg-type]
+    flat = mesh.transformed(np.diag([1, 1, 0, 1]))
+    assert flat.normals is not None and flat.normals.tolist() == [[0, 0, 1]] * 3
+
+
+@cases("matrix", [np.eye(3), np.full((4, 4), np.nan), np.diag([1, 1, 1, 2]), "matrix"])
+def test_transformed_refuses_what_is_not_affine(matrix: Any) -> None:
+    with pytest.raises(MeshError, match=r"^pot: matrix: expected"):
+        Mesh(**TRIANGLE, name="pot").transformed(matrix)
+
+
 def test_concatenate() -> None:
     a = Mesh(**TRIANGLE, normals=np.ones((3, 3)), colors=np.ones((3, 3)))  # type: ignore[arg-type]
     b = Mesh(**TRIANGLE, normals=np.zeros((3, 3)))

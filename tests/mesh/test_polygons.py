@@ -103,6 +103,13 @@ def test_the_fan_is_wrong_for_each_of_these(name: str) -> None:
             assert_right(points, fan(len(points)))
 
 
+def test_a_concave_polygon_that_its_first_corner_sees_whole_keeps_its_fan() -> None:
+    points = np.roll(placed(DART), 2, axis=0)  # from the notch's bottom
+    assert cut(points) == fan(4)
+    assert_right(points, fan(4))
+    assert cut(placed(DART)) == fan(4) and cut(np.roll(placed(DART), 1, axis=0)) != fan(4)
+
+
 @settings(deadline=None, max_examples=300)
 @given(st.integers(3, 12), st.integers(0, 10**6), st.booleans(), st.sampled_from([1.0, 1e-30, 1e200]))
 def test_convex_polygons_keep_their_fan(corners: int, seed: int, single: bool, size: float) -> None:
@@ -189,6 +196,12 @@ def test_an_outline_that_folds_back_onto_its_edge_is_not_simple() -> None:
             outline = np.ascontiguousarray(outline[:, ::-1] * [-1.0, 1.0])
         order = np.argsort(np.minimum(outline, np.roll(outline, -1, axis=0))[:, 0])
         assert not ears.is_simple(outline, order)
+
+
+def test_bent_polygons_keep_their_fan_slightly_bent_ones_are_cut() -> None:
+    for height, kept in [(0.02, False), (0.9, True)]:
+        points = placed(L_SHAPE) + np.outer([0, 1, 0, 1, 0, 1], [0, 0, height])
+        assert (cut(points) == fan(6)) == kept
 
 
 @cases("index", [-1, 6, 2**62, -(2**62)])

@@ -39,6 +39,12 @@ def test_the_bad_is_dropped_and_reported() -> None:
     assert repairs and str(repairs) == "dropped 3 of 5 faces; 1 vertices are not finite"
 
 
+def test_a_bad_vertex_that_no_face_names_is_reported() -> None:
+    mesh, repairs = Mesh.repaired([*VERTICES[:3], [np.inf, 0, 0]], [[0, 1, 2]])
+    assert repairs and repairs.bad_vertices.tolist() == [3] and not len(repairs.dropped_faces)
+    assert mesh.extent.tolist() == [1, 1, 0]
+
+
 @given(st.sampled_from(["soup", "lattice", "duplicates", "sizes"]), st.integers(0, 2**20), st.integers(0, 40))
 def test_right_input_stays_as_it_is(kind: str, seed: int, count: int) -> None:
     vertices, faces = make_mesh(kind, seed, count)
@@ -102,6 +108,11 @@ class TestAccelerators:
         assert accelerator(VERTICES[:3], FACES[:1]).repairs is None
         assert accelerator.from_mesh(Mesh(VERTICES[:3], FACES[:1])).repairs is None  # type: ignore[arg-type]
         assert not accelerator(VERTICES[:3], FACES[:1], repair=True).repairs
+
+    @pytest.mark.parametrize("bad", [None, 1, "yes", [True]])
+    def test_repair_is_true_or_false(self, accelerator: Any, bad: Any) -> None:
+        with pytest.raises(ValueError, match=r"^repair: expected True or False, got"):
+            accelerator(VERTICES, FACES, repair=bad)
 
 
 @given(st.integers(0, 2**20), st.sampled_from(["midpoint", "sah"]))

@@ -204,6 +204,13 @@ def test_planes_that_are_not_kept_have_no_pixels_and_others_the_same(tmp_path: P
         image.save(tmp_path / f"a.{suffix}")
 
 
+@pytest.mark.judges("render")
+@cases("planes", ["depth", ["color"], ["depth", 3], np.array(4), None])
+def test_unknown_planes_are_refused(planes: Any) -> None:
+    with pytest.raises(ValueError, match=r"^planes: expected some of radiance, depth, normal, face, rays, got "):
+        render(load_scene(STAIRS), resolution=(4, 4), planes=planes)
+
+
 def test_a_file_keeps_its_mode(tmp_path: Path) -> None:
     path = tmp_path / "private.bin"
     path.touch()

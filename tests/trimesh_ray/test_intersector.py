@@ -113,6 +113,12 @@ class TestContent:
         gc.collect()
         assert key not in trees._kept and digest not in trees._by_digest
 
+    def test_two_meshes_of_one_digest_have_their_own_trees(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        small, large = trimesh.creation.box(), trimesh.creation.box(extents=[4, 4, 4])
+        monkeypatch.setattr(trimesh.Trimesh, "__hash__", lambda self: 7)
+        assert asked(small).contains_points([[1, 1, 1]]).tolist() == [False]
+        assert asked(large).contains_points([[1, 1, 1]]).tolist() == [True]
+
 
 class TestCopies:
     def test_pickles_and_copies_answer_and_carry_no_tree(self) -> None:
