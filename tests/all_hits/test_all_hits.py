@@ -205,15 +205,6 @@ def test_nothing_met_and_nothing_asked():
     assert Octree(np.empty((0, 3)), np.empty((0, 3), int)).count_hits([[0, 0, 0]], [[0, 0, 1]]).tolist() == [0]
 
 
-def test_faces_are_left():
-    octree = Octree.from_mesh(box())
-    start = octree.closest_hit([[0.5, 0.5, 3.0]], [[0, 0, -1]])
-    found = octree.all_hits(start.points, [[0, 0, -1]], leaving=start.face)
-    assert found.t.tolist() == pytest.approx([1.0], rel=1e-12) and octree.count_hits(
-        start.points, [[0, 0, -1]], leaving=start.face
-    ) == [1]
-
-
 @cases(
     ("options", "told"),
     [
@@ -267,13 +258,6 @@ def test_a_ray_may_meet_as_many_blocks_as_are_listed_and_one_more(count):
     assert octree.stats.blocks == count
     met = octree.all_hits([[0.5, 0.5, -1.0]] * 2, [0, 0, 1])
     assert met.counts.tolist() == [count, count] and met.face.tolist() == [*range(count)] * 2
-
-
-@BOTH
-def test_the_nearest_contacts_are_kept(accelerator):
-    """What is kept are contacts, the nearest, in whatever order hits are found."""
-    found = accelerator.from_mesh(box()).all_hits([[0.5, 0.5, 3]], [[0, 0, -1]], max_hits=2)
-    assert found.t.tolist() == [2.0, 3.0]
 
 
 def test_normals_are_those_of_the_faces_windings():

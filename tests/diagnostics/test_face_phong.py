@@ -8,13 +8,11 @@ import pytest
 from cases import cases
 from numpy.typing import NDArray
 
-from renderer.diagnostics import face_phong
 from renderer.diagnostics.face_phong import face_colors
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, icosphere, torus
 from renderer.picture.image import srgb
 from renderer.picture.pack import pack
-from renderer.picture.render import render
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.light import DirectionalLight, PointLight
 from renderer.scene.material import Dielectric, Material, Mirror, Phong
@@ -89,22 +87,6 @@ def test_the_formula(eye: Any) -> None:
     assert (got != expected).mean() < 1e-3
 
 
-@pytest.mark.parametrize("material", [MATTE, SHINY.model_copy(update={"reflectance": (0.0, 0.0, 0.0)})])
-def test_a_pixel_at_a_centroid(material: Phong) -> None:
-    """The renderer's picture through a face's centroid, shadows off, has the face's colour."""
-    mesh, seen = icosphere(1), 0
-    colors = colors_of(scene((mesh, material)))
-    for face, corners in enumerate(mesh.triangles):
-        camera = PerspectiveCamera(eye=EYE, target=tuple(corners.mean(axis=0).tolist()), fov=5)
-        image = render(scene((mesh, material), camera=camera), resolution=(1, 1), shadows=False, threads=1)
-        if image.face[0, 0] == face:
-            seen += 1
-            difference = colors[face].astype(int) - srgb(image.radiance[0, 0])
-            # The radiance in a picture is a float32, which may step over the edge of a code.
-            assert np.abs(difference).max() <= 1
-    assert 20 < seen < 60  # of 80 those in front
-
-
 def test_every_code_begins_where_srgb_says() -> None:
     """A face for each number about each step, that number its ambient light: codes equal ``srgb``, bit by bit."""
     codes = np.arange(1, 256)
@@ -146,27 +128,9 @@ class TestStandIns:
         np.testing.assert_array_equal(got, colors_of(scene((icosphere(2), Phong(diffuse=grey)), floor)))
         assert got[:320].max() > 160
 
-    def test_the_world_stays_as_it_is(self) -> None:
-        _, world = pack(scene((icosphere(1), Mirror(type="mirror")), (box(), MATTE)))
-        before = world.materials.copy()
-        face_colors(world, EYE, 1)
-        np.testing.assert_array_equal(world.materials, before)
-
-    def test_a_black_surface_stays_black(self) -> None:
-        assert not colors_of(scene((box(), Phong(diffuse=0.0)))).any()
-
-
 def test_the_same_bits_for_any_number_of_threads() -> None:
     what = scene((icosphere(5), SHINY))  # three chunks
     np.testing.assert_array_equal(colors_of(what, threads=1), colors_of(what, threads=3))
-
-
-def test_as_many_threads_as_asked_for_share_large_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = []
-    monkeypatch.setattr(face_phong, "for_chunks", lambda work, count, size, threads: asked.append((size, threads)))
-    colors_of(scene((box(), MATTE)), threads=3)
-    [(size, threads)] = asked
-    assert threads == 3 and size >= 1000
 
 
 def test_more_ready_than_needed_changes_nothing() -> None:
@@ -209,8 +173,3 @@ def test_no_faces() -> None:
 def test_a_bad_eye_is_named(eye: Any) -> None:
     with pytest.raises(ValueError, match="eye: expected three finite numbers"):
         colors_of(scene((box(), MATTE)), eye)
-
-
-def test_bad_threads_are_named() -> None:
-    with pytest.raises(ValueError, match="threads: expected"):
-        colors_of(scene((box(), MATTE)), threads=0)

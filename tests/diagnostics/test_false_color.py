@@ -46,12 +46,6 @@ def row(**changed: Any) -> Image:
 
 @pytest.mark.parametrize("aov", AOVS)
 class TestAll:
-    def test_shape_and_dtype(self, aov: str) -> None:
-        colors = false_color(ball(), aov)
-        assert colors.shape == (30, 40, 3) and colors.dtype == np.uint8
-
-    def test_the_same_whatever_the_threads(self, aov: str) -> None:
-        np.testing.assert_array_equal(false_color(ball(), aov), false_color(ball(2), aov))
 
     def test_a_miss_shows_the_background(self, aov: str) -> None:
         image = ball()
@@ -69,23 +63,11 @@ class TestAll:
             np.testing.assert_array_equal(colors, srgb(nothing.radiance))
 
 
-def test_color_is_the_picture() -> None:
-    np.testing.assert_array_equal(false_color(ball(), "color"), srgb(ball().radiance))
-
-
 class TestDepth:
     def test_the_nearest_is_the_brightest(self) -> None:
         near, middle, far = false_color(row(), "depth")[0, :3].tolist()
         assert near == [240] * 3 and far == [30] * 3 and middle == [135] * 3
         assert limits_of(row(), "depth") == (2.0, 4.0)
-
-    def test_of_a_ball_the_rim_is_darkest(self) -> None:
-        image = ball()
-        grey = false_color(image, "depth")[..., 0].astype(int)
-        hit = image.face >= 0
-        order = np.argsort(image.depth[hit])
-        assert (np.diff(grey[hit][order]) <= 0).all()
-        assert len(np.unique(grey[hit])) > 100
 
     def test_limits_hold_still_what_would_change_with_the_view(self) -> None:
         shades = false_color(row(), "depth", (2.5, 3.5))[0, :3, 0].tolist()
@@ -163,16 +145,6 @@ class TestFaces:
         faces = [0, 1, 2, 99_999, 2**31 - 1]
         expected = [[48 + (lowbias32(f) >> shift & 255) * 207 // 255 for shift in (0, 8, 16)] for f in faces]
         assert self.colors(faces).tolist() == expected
-
-    def test_neighbouring_numbers_look_different(self) -> None:
-        colors = self.colors(np.arange(100_000))
-        assert colors.min() >= 48 and colors.max() == 255
-        for step in (1, 2, 64):
-            apart = np.abs(colors[step:] - colors[:-step]).max(axis=1)
-            # Of colours by chance (2 * 16 / 208)^3, 4 in 1000, are this alike.
-            assert (apart < 16).mean() < 0.006
-        assert len(np.unique(colors, axis=0)) > 99_000
-
 
 class TestCost:
     def test_from_few_to_many(self) -> None:

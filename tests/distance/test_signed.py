@@ -29,19 +29,6 @@ def test_the_sign_is_that_of_exact_arithmetic(name):
     assert not np.signbit(distances[distances == 0.0]).any()
 
 
-def test_inside_a_box_analytically():
-    points = np.random.default_rng(0).uniform(-1, 2, (2000, 3))
-    outside = np.linalg.norm(np.maximum(np.maximum(-points, points - 1), 0), axis=1)
-    expected = np.where(outside > 0, outside, np.maximum(-points, points - 1).max(axis=1))
-    distances = Octree.from_mesh(box()).signed_distance(points.reshape(20, 100, 3))
-    np.testing.assert_allclose(distances, expected.reshape(20, 100), rtol=1e-14, atol=1e-16)
-
-
-def test_beyond_max_distance_the_sign_stays():
-    octree = Octree.from_mesh(box((-2, -2, -2), (2, 2, 2)))
-    assert octree.signed_distance([[0, 0, 0], [0, 0, 4], [0, 0, 1.5]], 1.0).tolist() == [-np.inf, np.inf, -0.5]
-
-
 def test_rules_and_open_meshes():
     mesh = box((-1, -1, -1), (1, 1, 1))
     faces = mesh.faces.copy()

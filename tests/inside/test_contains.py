@@ -66,12 +66,6 @@ def test_threads_batches_and_shapes_change_nothing():
     np.testing.assert_array_equal(octree.contains(points[order]), expected[order])
 
 
-def test_a_refit_serves_it_too():
-    octree = Octree.from_mesh(box())
-    octree.refit(octree.mesh.vertices + 10.0)
-    np.testing.assert_array_equal(octree.contains([[0.5, 0.5, 0.5], [10.5, 10.5, 10.5]]), [False, True])
-
-
 @pytest.mark.parametrize(("rule", "count"), [("nonzero", 3), ("even-odd", 3)])
 def test_an_open_mesh_has_no_inside(rule, count):
     mesh = box()
@@ -87,19 +81,6 @@ def test_faces_turned_at_will_are_closed_for_even_odd_alone():
     assert octree.contains([[0.1, 0.2, 0.3], [3, 0, 0]], rule="even-odd").tolist() == [True, False]
     with pytest.raises(ValueError, match="mesh: expected a closed mesh"):
         octree.contains([[0.1, 0.2, 0.3]])
-
-
-@pytest.mark.parametrize(
-    ("points", "said"),
-    [
-        ([[0.0, 0.0]], r"points: expected shape \(\.\.\., 3\), got shape \(1, 2\)"),
-        ([[0.0, 0.0, 0.0], [0.0, np.nan, 0.0]], r"points: expected finite numbers, got \[0\.0, nan, 0\.0\] in row 1"),
-        ([["a", "b", "c"]], "points: "),
-    ],
-)
-def test_bad_points_are_named(points, said):
-    with pytest.raises(ValueError, match=said):
-        Octree.from_mesh(box()).contains(points)
 
 
 def test_an_empty_mesh_and_an_unknown_rule_are_refused():
@@ -200,12 +181,6 @@ def test_points_with_one_tiny_coordinate_need_no_rational_arithmetic(monkeypatch
     triangles = [rational(triangle.tolist()) for triangle in octree.mesh.triangles]
     expected = [winding_number(point, triangles) for point in rational(points)]
     assert inside.tolist() == [number != 0 for number in expected] and 0 < inside.sum() < 60
-
-
-@pytest.mark.parametrize("boundary", ["false", 1, None])
-def test_an_answer_for_the_boundary_that_is_none_is_refused(boundary):
-    with pytest.raises(ValueError, match="boundary: expected True or False"):
-        Octree.from_mesh(box()).contains([[0, 0, 0]], boundary=boundary)
 
 
 def test_points_on_faces_whose_products_vanish_are_on_them():

@@ -4,14 +4,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from cases import cases
 from hypothesis import given
 from hypothesis import settings as limits
 from hypothesis import strategies as st
 
-import renderer
 from renderer import OrthographicCamera, PerspectiveCamera, load_scene, prepare, render
 from renderer.picture.image import PLANES
 from renderer.picture.prepare import Octree
@@ -101,13 +99,3 @@ def test_the_tree_is_built_once(monkeypatch):
     for x in range(3):
         render(ready, camera=PerspectiveCamera(eye=(x, 3, 4), target=(0, 0, 0)), resolution=(4, 4))
     assert built == [1]
-
-
-def test_the_pictures_codes_are_those_of_the_file(tmp_path):
-    from PIL import Image
-
-    picture = render(load_scene("scenes/stairs.toml"), resolution=(20, 10))
-    picture.save(tmp_path / "a.png")
-    assert picture.srgb.dtype == np.uint8 and picture.srgb.shape == (10, 20, 3)
-    np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "a.png")), picture.srgb)
-    np.testing.assert_array_equal(renderer.srgb(picture.radiance), picture.srgb)

@@ -18,9 +18,7 @@ from renderer.picture.render import render
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.light import DirectionalLight
 from renderer.scene.material import Phong
-from renderer.scene.needs import needs_of
-from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject, checked_settings, load_scene
-from renderer.trace.spawn import BOUNDED
+from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject, load_scene
 
 pytestmark = pytest.mark.judges(
     "DirectionalLight", "Image", "PreparedScene.picture", "RenderSettings", "render", "scene.render",
@@ -237,19 +235,3 @@ def test_without_shadows_every_light_reaches_what_faces_it() -> None:
     assert (lit.radiance[floor] == np.float32(0.5)).all()
     assert (hidden.radiance[floor] == 0.0).any() and (hidden.radiance[floor] == np.float32(0.5)).any()
     assert lit.rays.max() == 1 and hidden.rays.max() == 2
-
-
-def test_a_stage_takes_pictures_with_other_cameras_as_render_does() -> None:
-    """Also from within glass, where the media around the eye are the new camera's."""
-    scene = load_scene(SCENES / "glass.toml")
-    ready = preparing.prepare_scene(scene, needs_of(scene))
-    glass = next(i.mesh for i in scene.instances if scene.materials[i.material].passes_light)
-    inside = np.mean(glass.bounds, axis=0)
-    for eye in ((4.0, 2.0, 5.0), tuple(inside.tolist())):
-        camera = PerspectiveCamera(eye=eye, target=(0.0, 0.5, 0.0), fov=50)
-        moved = scene.model_copy(update={"camera": camera})
-        expected = render(moved, resolution=(24, 20), max_depth=4)
-        chosen = checked_settings(scene.render, {"resolution": (24, 20), "max_depth": 4})
-        picture = ready.picture(camera, chosen, BOUNDED, 2)
-        assert picture.radiance.tobytes() == expected.radiance.tobytes()
-        assert picture.rays.tobytes() == expected.rays.tobytes()

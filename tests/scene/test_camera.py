@@ -90,34 +90,11 @@ def test_frame_does_not_depend_on_the_distance(scale: float) -> None:
     assert np.array(camera.frame()).tolist() == [[1, 0, 0], [0, 1, 0], [0, 0, -1]]
 
 
-@cases(
-    "kind",
-    [
-        perspective,
-        lambda **c: OrthographicCamera(
-            **{"type": "orthographic", "height": 2.0, "eye": (0, 0, 5), "target": (0, 0, 0), **c}
-        ),
-    ],
-)
-@cases(
-    "fault",
-    [
-        {"target": (0, 0, 5)},
-        {"up": (0, 0, 1)},
-        {"up": (0, 0, -2)},
-        {"up": (0, 0, 0)},
-        {"eye": (0, 0, math.nan)},
-        {"up": (0, math.inf, 0)},
-        {"eye": (0, 0)},
-        {"fov": 0, "height": 0},
-        {"fov": 180, "height": -1},
-        {"fov": math.nan, "height": math.inf},
-    ],
-)
-def test_refuses_a_camera_without_a_view(kind: Any, fault: dict[str, Any]) -> None:
-    own = "fov" if kind is perspective else "height"
-    with pytest.raises(ValueError):
-        kind(**{k: v for k, v in fault.items() if k == own or k not in ("fov", "height")})
+@cases("fault", [{"target": (0, 0, 5)}, {"up": (0, 0, 1)}, {"up": (0, 0, -2)}, {"up": (0, 0, 0)}])
+def test_refuses_a_camera_without_a_view(fault: dict[str, Any]) -> None:
+    for kind, lens in ((PerspectiveCamera, {}), (OrthographicCamera, {"height": 2.0})):
+        with pytest.raises(ValueError, match=r"target != eye|up not parallel"):
+            kind(**{"eye": (0, 0, 5), "target": (0, 0, 0), **lens, **fault})
 
 
 def test_orthographic_rays_are_parallel_and_a_pixel_apart() -> None:

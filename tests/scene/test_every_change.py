@@ -4,10 +4,9 @@ from pathlib import Path
 from typing import get_args
 
 import numpy as np
-import pytest
 import tomlkit
 from cases import cases
-from varied import BASE, VARIATIONS, Table, Variation, picture, scene_of, write_meshes
+from varied import BASE, VARIATIONS, Table, Variation, picture, scene_of
 
 from renderer import RenderSettings
 from renderer.cli.main import main
@@ -18,13 +17,6 @@ from renderer.scene.light import Light
 from renderer.scene.material import Material
 
 CHANGED = [other for other in VARIATIONS if other.keys[0] in _Changes.model_fields]
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("changes")
-    write_meshes(folder)
-    return folder
 
 
 def written_by(folder: Path, table: Table, text: str) -> np.ndarray:

@@ -16,7 +16,7 @@ from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, icosphere
 from renderer.picture.pack import pack
 from renderer.picture.render import render
-from renderer.scene.camera import OrthographicCamera, PerspectiveCamera
+from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.light import DirectionalLight, PointLight
 from renderer.scene.material import Dielectric, Mirror, Phong
 from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject, load_scene
@@ -148,19 +148,6 @@ def test_a_file_that_uses_every_key(folder: Path) -> None:
         ("glass", True), ("mirror", False), ("clay", False), ("glass", False)]  # fmt: skip
 
 
-def test_what_a_file_leaves_out(folder: Path) -> None:
-    scene = load(folder, CAMERA + MATERIAL)
-    assert (scene.lights, scene.objects, scene.floor, scene.instances) == ((), (), None, ())
-    assert scene.ambient == scene.background == (0, 0, 0)
-    assert scene.render.resolution == (512, 512) and scene.render.samples == 1 and scene.render.max_depth == 6
-    assert isinstance(scene.camera, PerspectiveCamera) and scene.camera.fov == 45 and scene.camera.up == (0, 1, 0)
-
-
-def test_orthographic_camera(folder: Path) -> None:
-    scene = load(folder, CAMERA + 'type = "orthographic"\nheight = 3\n[materials]\n')
-    assert scene.camera == OrthographicCamera(type="orthographic", eye=(0, 0, 5), target=(0, 0, 0), height=3)
-
-
 def with_key(table: str, line: str) -> str:
     """FULL with a line added to the top of a table (or of the file), in place of the key's line if it has one."""
     key = line.split("=")[0].strip()
@@ -170,76 +157,39 @@ def with_key(table: str, line: str) -> str:
     return f"{head}{found}{line}\n{own}{gap}{rest}"
 
 
+# One of each kind of fault and of place; what each field refuses is in test_fields.py.
 FAULTS = [
     # table, line, the key's path, what the message must say besides
     ("", "speed = 3", "speed", ["unknown key", "3"]),
     ("[render]", "speed = 3", "render.speed", ["unknown key", "3"]),
-    ("[camera]", "speed = 3", "camera.speed", ["unknown key", "3"]),
     ("[camera]", "height = 3", "camera.height", ["unknown key", "3"]),
-    ("[materials.clay]", "speed = 3", "materials.clay.speed", ["unknown key", "3"]),
     ("[materials.glass]", "diffuse = 3", "materials.glass.diffuse", ["unknown key", "3"]),
-    ("[materials.mirror]", "speed = 3", "materials.mirror.speed", ["unknown key", "3"]),
     ("[[lights]]", "speed = 3", "lights.0.speed", ["unknown key", "3"]),
     ("[[objects]]", "speed = 3", "objects.0.speed", ["unknown key", "3"]),
     ("[floor]", "speed = 3", "floor.speed", ["unknown key", "3"]),
     ("", "ambient = -0.5", "ambient", ["greater than or equal to 0", "-0.5"]),
-    ("", "ambient = [1, 2]", "ambient", ["[1, 2]"]),
     ("", "ambient = nan", "ambient", ["finite", "nan"]),
-    ("", "ambient = inf", "ambient", ["finite", "inf"]),
-    ("", 'ambient = "bright"', "ambient", ["bright"]),
-    ("", "background = {}", "background", []),
-    ("[render]", "resolution = [0, 6]", "render.resolution.0", ["1", "0"]),
+    ("", "ambient = true", "ambient", []),
     ("[render]", "resolution = [8, 1000000]", "render.resolution.1", ["16384", "1000000"]),
-    ("[render]", "resolution = 8", "render.resolution", ["8"]),
-    ("[render]", "resolution = [8, 6, 4]", "render.resolution", ["[8, 6, 4]"]),
-    ("[render]", "resolution = [8.5, 6]", "render.resolution.0", ["8.5"]),
     ("[render]", "samples = 3", "render", ["samples", "square number", "got 3"]),
-    ("[render]", "samples = 0", "render", ["samples", "got 0"]),
-    ("[render]", "samples = -4", "render", ["samples", "got -4"]),
-    ("[render]", "max_depth = -1", "render.max_depth", ["-1"]),
-    ("[render]", "max_depth = 65", "render.max_depth", ["64", "65"]),
-    ("[render]", "min_weight = 1.0", "render.min_weight", ["1.0"]),
-    ("[render]", "min_weight = nan", "render.min_weight", ["nan"]),
     ("[camera]", 'type = "fisheye"', "camera", ["fisheye", "perspective", "orthographic"]),
-    ("[camera]", "type = 3", "camera", ["3"]),
     ("[camera]", "type = [3]", "camera", ["3"]),
     ("[camera]", "eye = [0, 0]", "camera.eye", ["[0, 0]"]),
-    ("[camera]", "eye = [0, 0, inf]", "camera.eye.2", ["inf"]),
     ("[camera]", "target = [0, 1, 5]", "camera", ["target != eye"]),
     ("[camera]", "up = [0, 1, 5]", "camera", ["up not parallel"]),
-    ("[camera]", "up = [0, 0, 0]", "camera", ["up not parallel"]),
-    ("[camera]", "fov = 180", "camera.fov", ["180"]),
-    ("[camera]", "fov = 0", "camera.fov", ["0"]),
-    ("[camera]", "fov = nan", "camera.fov", ["nan"]),
+    ("[camera]", 'fov = "45"', "camera.fov", []),
     ("[camera]", "fov = 1979-05-27", "camera.fov", ["1979"]),
     ("[materials.clay]", 'type = "gold"', "materials.clay", ["gold", "phong", "mirror", "dielectric"]),
     ("[materials.clay]", "diffuse = [0.1, 0.2, -0.3]", "materials.clay.diffuse.2", ["-0.3"]),
-    ("[materials.clay]", "shininess = -1", "materials.clay.shininess", ["-1"]),
-    ("[materials.clay]", "ior = 0", "materials.clay.ior", ["0"]),
-    ("[materials.glass]", "ior = inf", "materials.glass.ior", ["inf"]),
-    ("[materials.mirror]", "reflectance = nan", "materials.mirror.reflectance", ["nan"]),
     ("[[lights]]", 'type = "spot"', "lights.0", ["spot", "directional", "point"]),
     ("[[lights]]", "direction = [0, 0, 0]", "lights.0.direction", ["non-zero"]),
-    ("[[lights]]", "direction = [0, nan, 0]", "lights.0.direction.1", ["nan"]),
-    ("[[lights]]", "irradiance = -1", "lights.0.irradiance", ["-1"]),
-    ("[[objects]]", "mesh = 3", "objects.0.mesh", ["3"]),
     ("[[objects]]", 'mesh = "models/none.ply"', "objects", ["none.ply", "No such file"]),
     ("[[objects]]", 'mesh = "models"', "objects", ["models", "suffix"]),
     ("[[objects]]", 'mesh = "models/broken.ply"', "objects", ["broken.ply"]),
-    ("[[objects]]", 'mesh = "models/box.abc"', "objects", ["box.abc", "suffix"]),
     ("[[objects]]", 'mesh = "models/bo\\u0000x.ply"', "objects", ["null byte"]),
     ("[[objects]]", 'material = "gold"', "objects.0.material", ["clay", "glass", "mirror", "'gold'"]),
-    ("[[objects]]", "material = 3", "objects.0.material", ["3"]),
     ("[[objects]]", 'normals = "soft"', "objects.0.normals", ["flat", "smooth", "soft"]),
-    ("[[objects]]", "scale = [1, 2]", "objects.0.scale", ["[1, 2]"]),
-    ("[[objects]]", "scale = nan", "objects.0.scale", ["nan"]),
-    ("[[objects]]", "rotate = 30", "objects.0.rotate", ["30"]),
-    ("[[objects]]", "translate = [0, inf, 0]", "objects.0.translate.1", ["inf"]),
     ("[floor]", "min = [4, -4]", "floor", ["min < max"]),
-    ("[floor]", "max = [nan, 4]", "floor", ["finite"]),
-    ("[floor]", "squares = [0, 1]", "floor.squares.0", ["0"]),
-    ("[floor]", "squares = [1, 1001]", "floor.squares.1", ["1000", "1001"]),
-    ("[floor]", "materials = []", "floor.materials", ["at least 1"]),
     ("[floor]", 'materials = ["clay", "glass", "clay"]', "floor.materials", ["at most 2"]),
     ("[floor]", 'materials = ["gold"]', "floor.materials", ["clay", "'gold'"]),
 ]
@@ -253,31 +203,6 @@ def test_each_fault_is_one_line_with_its_place(
     assert re.match(re.escape(where) + r"(\.\d)?: ", message), message
     for words in says:
         assert words in message, message
-
-
-# TOML has types; a bool is no number there and neither is a string.
-WRONG_TYPES = [
-    ("", "ambient = true", "ambient"),
-    ("", 'background = ["1", "2", "3"]', "background"),
-    ("[render]", "samples = true", "render.samples"),
-    ("[render]", 'max_depth = "3"', "render.max_depth"),
-    ("[render]", "max_depth = true", "render.max_depth"),
-    ("[camera]", 'fov = "45"', "camera.fov"),
-    ("[camera]", 'eye = ["0", "1", "5"]', "camera.eye"),
-    ("[camera]", "fov = true", "camera.fov"),
-    ("[materials.clay]", "reflectance = true", "materials.clay.reflectance"),
-    ("[materials.clay]", "shininess = true", "materials.clay.shininess"),
-    ("[materials.glass]", 'ior = "1.5"', "materials.glass.ior"),
-    ("[[objects]]", "scale = true", "objects.0.scale"),
-    ("[[objects]]", 'rotate = ["0", "0", "0"]', "objects.0.rotate"),
-    ("[floor]", 'min = ["-4", "-4"]', "floor.min"),
-    ("[floor]", "squares = [true, true]", "floor.squares"),
-]
-
-
-@cases(("table", "line", "where"), WRONG_TYPES)
-def test_a_value_of_another_type_is_not_taken_for_a_number(folder: Path, table: str, line: str, where: str) -> None:
-    assert error_of(folder, with_key(table, line)).startswith(where)
 
 
 @cases(
@@ -362,43 +287,11 @@ def test_mesh_paths_are_relative_to_the_scene_file(folder: Path, monkeypatch: py
 
 # Values that a number, vector, string or table of the file may be replaced with.
 STRANGE: list[str] = [
-    "1e308",
-    "-1e308",
-    "1e-320",
-    "1e160",
-    "1e-200",
-    "0",
-    "-0.0",
-    "-1",
-    "1",
-    "2.5",
-    "nan",
-    "inf",
-    "-inf",
-    "true",
-    '""',
-    '"\\u0000"',
-    '"a\\nb"',
-    "{}",
-    "[[]]",
-    "{a=1}",
-    "1979-05-27",
-    "07:32:00",
-    "99999999999999999999",
-    "[1e308,1e308,1e308]",
-    "[1e-200,0,0]",
-    "[0,0,0]",
-    "[1,2]",
-    "[true,1,1]",
-    '["clay"]',
-    '"clay"',
-    '"models/box.ply"',
-    '"models"',
-    '"mirror"',
-    '"dielectric"',
-    '"point"',
-    "[]",
-]
+    "1e308", "-1e308", "1e-320", "1e160", "1e-200", "0", "-0.0", "-1", "1", "2.5", "nan", "inf", "-inf", "true",
+    '""', '"\\u0000"', '"a\\nb"', "{}", "[[]]", "{a=1}", "1979-05-27", "07:32:00", "99999999999999999999",
+    "[1e308,1e308,1e308]", "[1e-200,0,0]", "[0,0,0]", "[1,2]", "[true,1,1]", '["clay"]', '"clay"',
+    '"models/box.ply"', '"models"', '"mirror"', '"dielectric"', '"point"', "[]",
+]  # fmt: skip
 STRANGE += ["9" * 4400, "0x" + "f" * 4400]
 LINES = FULL.splitlines()
 
@@ -428,7 +321,7 @@ def mutated(draw: Any) -> str:
     return "\n".join(lines)
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(text=mutated())
 @example(FULL.replace("translate = [1, 0, 0]", "translate = [1e308, 0, 0]").replace("scale = 0.5", "scale = 1e308"))
 @example(FULL.replace("translate = [1, 0, 0]", "translate = [1e300, 0, 0]"))
@@ -518,28 +411,6 @@ def turned(degrees: Any, points: np.ndarray) -> np.ndarray:
 
 
 class TestPlacing:
-    def test_scaled_then_turned_about_x_y_z_then_moved(self) -> None:
-        placed = SceneObject(mesh=box(), material="a", scale=(1, 2, 3), rotate=(30, 50, -110), translate=(7, 8, 9))
-        matrix = placed.matrix()
-        expected = turned((30, 50, -110), box().vertices * [1, 2, 3]) + np.array([7, 8, 9])
-        # A dozen roundings of values of at most 16.
-        np.testing.assert_allclose(box().vertices @ matrix[:3, :3].T + matrix[:3, 3], expected, atol=12 * 16 * 2.0**-53)
-        assert matrix[3].tolist() == [0, 0, 0, 1]
-
-    @cases(
-        ("rotate", "image"),
-        [
-            ((90, 0, 0), [(1, 0, 0), (0, 0, 1), (0, -1, 0)]),
-            ((0, 90, 0), [(0, 0, -1), (0, 1, 0), (1, 0, 0)]),
-            ((0, 0, 90), [(0, 1, 0), (-1, 0, 0), (0, 0, 1)]),
-            ((90, 90, 0), [(0, 0, -1), (1, 0, 0), (0, -1, 0)]),
-        ],
-    )
-    def test_quarter_turns(self, rotate: Any, image: Any) -> None:
-        """Where the x, y and z axes go; the last case tells x-then-y from y-then-x."""
-        matrix = SceneObject(mesh=box(), material="a", rotate=rotate).matrix()
-        np.testing.assert_allclose(matrix[:3, :3].T, image, atol=2.0**-52)
-
     def place(self, mesh: Mesh, **how: Any) -> Mesh:
         camera = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
         objects = (SceneObject(mesh=mesh, material="a", **how),)
@@ -561,10 +432,6 @@ class TestPlacing:
         eye = PerspectiveCamera(eye=(0.5, 0.5, 10), target=(0.5, 0.5, 0))
         scene = Scene(camera=eye, materials={"a": Phong()}, objects=(crate,))
         assert render(scene, resolution=(1, 1)).depth.tolist() == [[10 - 1.3]]
-
-    def test_a_mirroring_scale_keeps_outside_outside(self) -> None:
-        placed = self.place(box((-1, -1, -1), (1, 1, 1)), scale=(-1, 1, 1))
-        assert (np.einsum("ij,ij->i", placed.face_normals(), placed.triangles.mean(axis=1)) > 0).all()
 
     def test_normals_go_with_the_surface(self) -> None:
         ball = Mesh(icosphere(3).vertices, icosphere(3).faces, normals=icosphere(3).vertices)
@@ -589,22 +456,6 @@ class TestFloor:
         )
         return {i.material: i.mesh for i in scene.instances}
 
-    def test_one_material_fills_the_rectangle(self) -> None:
-        (mesh,) = self.parts(materials=("a",), squares=(3, 2)).values()
-        assert [b.tolist() for b in mesh.bounds] == [[-1, 0, -2], [3, 0, 4]]
-        assert len(mesh.faces) == 12 and (mesh.face_normals() == [0, 1, 0]).all()
-        a, b, c = np.moveaxis(mesh.triangles, 1, 0)
-        assert np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2 == pytest.approx(24, rel=1e-7)
-
-    def test_two_materials_alternate_from_the_corner(self) -> None:
-        parts = self.parts(squares=(4, 3))
-        for index, name in enumerate("ab"):
-            centres = parts[name].triangles.mean(axis=1)
-            column, row = np.floor(centres[:, 0] + 1).astype(int), np.floor((centres[:, 2] + 2) / 2).astype(int)
-            assert ((column + row) % 2 == index).all()
-            assert sorted(zip(column, row, strict=True)) == sorted(
-                2 * [(i, j) for i in range(4) for j in range(3) if (i + j) % 2 == index])  # fmt: skip
-
     def test_squares_share_their_edges(self) -> None:
         parts = self.parts(min=(-0.1, -0.7), max=(0.3, 0.9), squares=(7, 5))
         assert set(map(tuple, parts["a"].vertices)) == set(map(tuple, parts["b"].vertices))
@@ -617,9 +468,6 @@ class TestFloor:
             along, across = (np.unique(mesh.vertices[:, axis]) for axis in (0, 2))
             np.testing.assert_allclose(along, low[0] + np.arange(11), rtol=0, atol=1e-9)
             np.testing.assert_allclose(across, low[1] + np.arange(11), rtol=0, atol=1e-8)
-
-    def test_one_square_of_two_materials_uses_the_first(self) -> None:
-        assert list(self.parts()) == ["a"]
 
 
 def test_packed_rows_follow_the_instances(folder: Path) -> None:

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from cases import cases
 
-from renderer.studies import Pattern, cosine_hemisphere, fibonacci_hemisphere, fibonacci_sphere, reinhart, tregenza
+from renderer import Mesh
+from renderer.mesh.shapes import icosphere
+from renderer.studies import cosine_hemisphere, face_points, fibonacci_hemisphere, fibonacci_sphere, reinhart, tregenza
 from renderer.studies.directions import turned
 
 pytestmark = pytest.mark.judges(
-    "studies.FacePoints", "studies.Pattern", "studies.ambient_occlusion", "studies.cosine_hemisphere",
-    "studies.fibonacci_hemisphere", "studies.fibonacci_sphere", "studies.reinhart", "studies.sun_hours",
-    "studies.tregenza",
+    "studies.FacePoints", "studies.Pattern", "studies.cosine_hemisphere", "studies.face_points",
+    "studies.fibonacci_hemisphere", "studies.fibonacci_sphere", "studies.reinhart", "studies.tregenza",
 )  # fmt: skip
 
 
@@ -117,6 +118,33 @@ def test_numbers_of_directions_that_are_none(make, bad):
         make(bad)
 
 
-def test_patterns_are_tuples_of_directions_and_weights():
-    directions, weights = tregenza()
-    assert Pattern(directions, weights).weights is weights
+@pytest.mark.parametrize("count", [1, 2, 9, 1000])
+def test_spirals_have_equal_steps_of_height_or_of_its_square(count: int) -> None:
+    """Zones of one height have one area (Archimedes); rings of the disc, one step of the radius' square."""
+    even = (np.arange(count) + 0.5) / count
+    half, whole, disc = fibonacci_hemisphere(count), fibonacci_sphere(count), cosine_hemisphere(count)
+    # A few roundings of numbers up to 1; those of a square root count twice in its square.
+    np.testing.assert_allclose(half.directions[:, 2], even, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(whole.directions[:, 2], 2.0 * even - 1.0, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(disc.directions[:, 2] ** 2, even, rtol=0, atol=1e-15)
+    for pattern in (half, whole, disc):
+        assert len(np.unique(pattern.weights)) == 1
+        # A golden part of a turn from each to the next.
+        turn = np.diff(np.unwrap(np.arctan2(pattern.directions[:, 0], pattern.directions[:, 1])))
+        golden = 2.0 * np.pi * (np.sqrt(1.25) - 0.5)
+        # 1e-10: the fraction of up to 1e3 turns, over the sine of the angle to a pole, 0.03 at least.
+        np.testing.assert_allclose(np.mod(turn, 2.0 * np.pi), golden, rtol=0, atol=1e-10)
+
+
+def test_points_of_faces_are_centroids_with_unit_normals_to_the_outer_side() -> None:
+    ball = icosphere(2)
+    faces = np.insert(ball.faces, 7, [[5, 5, 6]], axis=0)
+    place = face_points(Mesh(2.0 * ball.vertices, faces))
+    assert place.faces.tolist() == [*range(7), *range(8, len(faces))] and place.faces.dtype == np.int64
+    corners = 2.0 * ball.triangles
+    np.testing.assert_allclose(place.points, corners.mean(axis=1), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(np.linalg.norm(place.normals, axis=1), 1.0, rtol=0, atol=4e-16)
+    turn = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])  # counter-clockwise
+    assert (np.einsum("ij,ij->i", place.normals, turn) > 0.0).all()
+    assert (np.einsum("ij,ij->i", place.normals, place.points) > 0.0).all()
+    assert place.points.dtype == place.normals.dtype == np.float64

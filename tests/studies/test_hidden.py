@@ -1,5 +1,9 @@
 """Which directions are hidden: the bits of rays that are written down, whatever the tiles, threads and places."""
 
+import io
+import tracemalloc
+from typing import Any
+
 import numpy as np
 import pytest
 from cases import cases
@@ -7,10 +11,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 from meshes import make_mesh, meshes
 
-from renderer import BruteForce, Mesh, Octree
+from renderer import BruteForce, Octree
 from renderer.mesh.heightfield import heightfield_mesh
 from renderer.mesh.shapes import box, icosphere, torus
-from renderer.studies import face_points, fibonacci_sphere, occlusion, tregenza
+from renderer.studies import (
+    ambient_occlusion,
+    face_points,
+    fibonacci_sphere,
+    occlusion,
+    openness,
+    sky_view_factor,
+    sun_hours,
+    tregenza,
+)
+from renderer.studies.share import check_request
 from renderer.studies.sweep import RAYS, TILE
 
 pytestmark = pytest.mark.judges("studies.FacePoints", "studies.occlusion", "studies.openness", "studies.sun_hours")
@@ -93,21 +107,6 @@ def test_a_point_may_look_in_more_directions_than_are_listed_at_once():
     assert 0 < expected[0].mean() < 1 and expected[1].all()
 
 
-@pytest.mark.parametrize("weighted", [False, True])
-def test_shares_are_sums_in_the_order_of_directions(weighted):
-    octree, rng = Octree.from_mesh(torus()), np.random.default_rng(5)
-    points, directions = rng.uniform(-1.5, 1.5, (700, 3)), rng.normal(size=(53, 3))
-    weights = rng.random(53) if weighted else None
-    expected = np.zeros(700)
-    counted = np.ones(53) if weights is None else weights
-    hidden = written_down(octree, points, None, directions)
-    for k in range(53):
-        expected += np.where(hidden[:, k], counted[k], 0.0)
-    share = occlusion(octree, points, None, directions, weights=weights)
-    np.testing.assert_array_equal(share, expected / np.cumsum(counted)[-1])
-    assert share.dtype == np.float64 and 0.0 < share.mean() < 1.0
-
-
 def test_bits_depend_neither_on_threads_nor_on_the_other_points():
     octree, rng = Octree.from_mesh(torus()), np.random.default_rng(6)
     points, normals = rng.uniform(-1.5, 1.5, (2000, 3)), rng.normal(size=(2000, 3))
@@ -139,19 +138,6 @@ def test_bits_stay_where_mesh_and_points_are_shifted_exactly(shift):
             occlusion(far, points + shift, None, directions, leaving=leaving, packed=True), seen
         )
         assert 0.0 < np.unpackbits(seen).mean() < 1.0
-
-
-def test_points_on_faces_are_not_hidden_by_their_own():
-    ball = icosphere(3)
-    octree, place = Octree.from_mesh(ball), face_points(ball)
-    directions = fibonacci_sphere(200).directions
-    hidden = occlusion(octree, place.points, place.normals, directions, leaving=place.faces, packed=True)
-    below = ~(place.normals @ directions.T > 0.0)
-    np.testing.assert_array_equal(unpacked(hidden, 200), below)
-    from_inside = occlusion(octree, place.points, -place.normals, directions, leaving=place.faces)
-    np.testing.assert_array_equal(from_inside, 1.0)
-    found = occlusion(octree, place.points, place.normals, directions, packed=True)
-    np.testing.assert_array_equal(found, hidden)
 
 
 def test_whether_points_lie_on_the_surface_is_found_out_and_their_normals_say_the_side():
@@ -193,26 +179,6 @@ def test_nothing_hides_beyond_the_distance():
     assert occlusion(octree, points, None, ways, distance=2.0).tolist() == [1.0]
     assert occlusion(octree, points, None, ways, distance=np.nextafter(2.0, 0.0)).tolist() == [0.0]
     assert occlusion(octree, points, None, ways, distance=0).tolist() == [0.0]
-
-
-def test_leading_dimensions_are_kept():
-    octree = Octree.from_mesh(box())
-    points = np.random.default_rng(8).normal(size=(4, 5, 3))
-    ways = np.eye(3)
-    share = occlusion(octree, points, None, ways)
-    assert share.shape == (4, 5)
-    np.testing.assert_array_equal(share.ravel(), occlusion(octree, points.reshape(-1, 3), None, ways))
-    assert occlusion(octree, points, None, ways, packed=True).shape == (4, 5, 1)
-    assert occlusion(octree, points[0, 0], [0, 0, 1], ways).shape == ()
-    assert occlusion(octree, np.empty((0, 3)), None, ways).shape == (0,)
-    assert occlusion(Octree.from_mesh(Mesh([], [])), points, None, ways).sum() == 0.0
-
-
-def test_one_normal_and_one_face_stand_for_all_points():
-    octree = Octree.from_mesh(torus())
-    points, ways = np.random.default_rng(9).normal(size=(30, 3)), fibonacci_sphere(40).directions
-    one = occlusion(octree, points, [0, 3, 0], ways, leaving=-1)
-    np.testing.assert_array_equal(one, occlusion(octree, points, np.tile([0.0, 0.5, 0.0], (30, 1)), ways))
 
 
 def test_faces_without_a_plane_are_left_as_any_hit_leaves_them():
@@ -305,3 +271,49 @@ def test_bits_over_many_small_faces(spread):
     expected = written_down(octree, points, np.tile([0.0, 0.0, 1.0], (1600, 1)), directions)
     np.testing.assert_array_equal(unpacked(bits, 145), expected)
     assert 0.1 < expected.mean() < 0.95
+
+
+POINTS = np.random.default_rng(2).uniform(-1.5, 1.5, (40, 3))
+
+
+ONE: dict[str, Any] = {
+    "occlusion": lambda octree, points=POINTS, **options: occlusion(octree, points, None, np.eye(3), **options),
+    "sky_view_factor": lambda octree, points=POINTS, **options: sky_view_factor(octree, points, **options),
+    "sun_hours": lambda octree, points=POINTS, **options: sun_hours(octree, points, None, np.eye(3), **options),
+    "ambient_occlusion": lambda octree, points=POINTS, **options: ambient_occlusion(
+        octree, points, [0, 0, 1], **options
+    ),
+    "openness": lambda octree, points=POINTS, **options: openness(octree, points, **options),
+}
+
+
+@cases("study", ONE)
+def test_a_bar_is_drawn_on_a_terminal_and_nowhere_else(study: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    octree = Octree.from_mesh(torus())
+    for stream, progress in ((Terminal(), True), (Terminal(), False), (io.StringIO(), True)):
+        monkeypatch.setattr("sys.stderr", stream)
+        ONE[study](octree, progress=progress)
+        assert bool(stream.getvalue()) == (stream.isatty() and progress)
+
+
+def test_threads_are_those_of_the_octree_unless_others_are_asked_for() -> None:
+    octree = Octree.from_mesh(torus(), threads=3)
+    for threads, used in ((None, 3), (1, 1), (7, 7)):
+        assert check_request(octree, POINTS, None, None, threads, False).threads == used
+
+
+def test_nothing_of_the_size_of_points_times_directions_is_made() -> None:
+    """An array of bools would have 40 megabytes; 15 are reserved for the faces at a corner, on two threads."""
+    octree, directions = Octree.from_mesh(box()), fibonacci_sphere(2000).directions
+    points = np.random.default_rng(3).uniform(2.0, 3.0, (20_000, 3))
+    occlusion(octree, points[:300], None, directions, threads=2)
+    tracemalloc.start()
+    try:
+        occlusion(octree, points, None, directions, threads=2)
+        assert tracemalloc.get_traced_memory()[1] < 15e6 + 6e6
+    finally:
+        tracemalloc.stop()

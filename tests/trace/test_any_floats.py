@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from cases import cases
 from meshes import make_mesh
-from numba import njit
 from numpy.typing import NDArray
 
 from renderer import (
@@ -24,14 +23,11 @@ from renderer import (
 from renderer.arguments.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.jit.decorators import kernel
 from renderer.mesh.shapes import icosphere
-from renderer.numerics.simd import bits_float
 from renderer.octree import Octree
 from renderer.trace.batch import NO_STARTS, RayBatch
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.rays import HIT_ROWS, hit_pointers, ray_pointers
-from renderer.trace.stream import _BOTTOM
 from renderer.trace.traverse import new_scratch, scratch_pointers, search_blocks, trace
-from renderer.trace.walk import stack_size
 
 # What arithmetic may end in, or begin with when nobody looked.
 WORST = np.array([0.0, 1.0, 0.3, 5e-324, 1e-310, 1e-30, 1e30, FARTHEST, 2.0**127, 3.5e38, 1e40, 1e300, 1.7e308, np.inf])
@@ -107,23 +103,6 @@ def test_no_ray_leaves_its_stack_or_spoils_another(kind, alike, any_hit):
     np.testing.assert_array_equal(found[:, good], right[:, good])
     assert (faces >= -1).all()
     assert (faces < len(mesh.faces)).all()
-
-
-def test_the_bottom_of_a_stack_is_beyond_no_limit():
-    """The invariant that keeps a ray on its stack: an entry is passed over only where its distance > the limit."""
-
-    @njit
-    def bottom():
-        return bits_float(_BOTTOM >> 32)
-
-    with np.errstate(over="ignore"):
-        limits = np.concatenate([ANY, [-0.0, -np.inf]]).astype(np.float32)
-    assert not (bottom() > limits).any()
-
-
-def test_a_stack_has_room_for_seven_octants_a_level_and_the_eight_of_the_last():
-    for depth in range(64):
-        assert stack_size(depth) >= 7 * depth + 8 + 1 + 8
 
 
 def scene_before(camera: Any) -> Scene:

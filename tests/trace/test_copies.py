@@ -3,9 +3,6 @@
 import copy
 import gc
 import pickle
-import subprocess
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,8 +12,6 @@ from renderer import BruteForce, MeshError, Octree, PerspectiveCamera, Phong, Sc
 from renderer.jit.notice import compile_seconds
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
-from renderer.system import child
-from renderer.trace.layout import CACHE_LINE
 
 COPIES = {"deepcopy": copy.deepcopy, "copy": copy.copy, "pickle": lambda thing: pickle.loads(pickle.dumps(thing))}
 by_any_way = pytest.mark.parametrize("way", COPIES)
@@ -44,15 +39,6 @@ def test_a_copy_of_a_used_tree_outlives_it(kind: Any, way: str) -> None:
     for n, t in zip((1, 100), expected, strict=True):
         np.testing.assert_array_equal(copied.closest_hit(RAYS[:n], -RAYS[:n]).t, t)
     assert other
-
-
-@by_any_way
-def test_a_copied_tree_has_memory_of_its_own(way: str) -> None:
-    tree = used(Octree).tree
-    copied = COPIES[way](tree)
-    assert not np.shares_memory(tree.nodes, copied.nodes)
-    assert copied.descriptor[0] == copied.nodes.ctypes.data != tree.descriptor[0]
-    assert copied.nodes.ctypes.data % CACHE_LINE == copied.blocks.ctypes.data % CACHE_LINE == 0
 
 
 @by_any_way
@@ -92,20 +78,3 @@ def test_a_copied_prepared_scene_renders_the_same_and_compiles_nothing(way: str)
     np.testing.assert_array_equal(render(copied, resolution=(16, 16)).radiance, expected)
     assert compile_seconds() == before
     assert copied.mesh is copied.octree.mesh
-
-
-def test_a_used_tree_is_sent_to_another_process(tmp_path: Path) -> None:
-    octree = used(Octree)
-    (tmp_path / "tree").write_bytes(pickle.dumps((octree, prepare(scene()), RAYS)))
-    code = (
-        "import pickle, sys; from renderer import render; octree, ready, rays = pickle.load(open(sys.argv[1], 'rb'));"
-        "print(octree.closest_hit(rays, -rays).t.tobytes().hex());"
-        "print(render(ready, resolution=(8, 8)).radiance.tobytes().hex())"
-    )
-    done = subprocess.run(
-        [sys.executable, "-P", "-c", code, str(tmp_path / "tree")],
-        capture_output=True, text=True, check=True, env=child.environment(), cwd=tmp_path,
-    )  # fmt: skip
-    t, radiance = done.stdout.split()
-    assert t == octree.closest_hit(RAYS, -RAYS).t.tobytes().hex()
-    assert radiance == render(scene(), resolution=(8, 8)).radiance.tobytes().hex()

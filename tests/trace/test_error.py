@@ -9,7 +9,6 @@ from meshes import make_mesh, rays_at
 
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import icosphere
-from renderer.trace import error as bounding
 from validation.oracle import exact
 from validation.oracle.starts import start_near
 from validation.oracle.vectors import cross, difference, dot
@@ -199,12 +198,3 @@ def test_rays_nearly_in_the_plane_of_a_face_that_they_meet_keep_their_bound():
                 met += 1
                 assert abs(Fraction(float(hits.t[row])) - t / (u + v + w)) <= hits.t_error[row]
     assert met > 10
-
-
-def test_bounds_are_computed_by_as_many_threads_as_the_octree_has(monkeypatch):
-    asked = []
-    monkeypatch.setattr(bounding, "for_chunks", lambda work, count, size, threads: asked.append((size, threads)))
-    octree = Octree.from_mesh(icosphere(1), threads=3)
-    octree.closest_hit([[0.0, 0.0, 3.0]], [[0.0, 0.0, -1.0]], t_error=True)
-    [(size, threads)] = asked
-    assert threads == 3 and size >= 1000

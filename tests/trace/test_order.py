@@ -3,14 +3,12 @@
 Rays beside planes and edge-on to faces, where the t of a hit errs by more than a box is wide.
 """
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 import pytest
 from cases import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from meshes import assert_same_hits, make_mesh, options, rays_at, separate
+from meshes import assert_same_hits, make_mesh, options, separate
 from numpy.random import Generator
 
 from renderer.jit.decorators import kernel
@@ -24,7 +22,7 @@ from renderer.trace.leaf import tree_pointers
 from renderer.trace.resolve import _meet_slab, resolve_uncertain
 from validation.oracle import exact
 
-SIDE = 100
+SIDE = 60
 
 
 def flat_overlapping(count):
@@ -52,40 +50,25 @@ def expected(flat):
     octree = Octree(*flat, threads=1)
     origins, directions = beside(1e-12)
     rows = [octree.closest_hit(origins[i : i + 1], directions[i : i + 1]) for i in range(SIDE**2)]
-    return Hits(
-        *(np.concatenate([getattr(row, name) for row in rows]) for name in ("t", "face", "u", "v")), octree.mesh
-    )
+    columns = [np.concatenate([getattr(row, name) for row in rows]) for name in ("t", "face", "u", "v")]
+    hits = Hits(*columns, octree.mesh)
+    assert hits.hit.mean() > 0.5 and abs(hits.t[hits.hit] - 1e-11).max() < 1e-15
+    return hits
 
 
-def test_most_rays_beside_the_plane_hit_near_it(expected):
-    assert expected.hit.sum() > SIDE**2 // 2
-    assert abs(expected.t[expected.hit] - 1e-11).max() < 1e-15
-
-
-@pytest.mark.judges("Octree.closest_hit")
-@cases("threads", [1, 2, 3])
-@cases("split", ["midpoint", "sah"])
-def test_rays_beside_a_plane_hit_the_same_with_any_threads(flat, expected, threads, split):
-    assert_same_hits(Octree(*flat, split=split, threads=threads).closest_hit(*beside(1e-12)), expected)
-
-
-@pytest.mark.judges("BruteForce")
+@pytest.mark.judges("BruteForce", "Octree.closest_hit")
 def test_rays_beside_a_plane_hit_the_same_by_brute_force(flat, expected):
-    assert_same_hits(BruteForce(*flat).closest_hit(*beside(1e-12)), expected)
-
-
-def test_rays_beside_a_plane_hit_the_same_after_a_refit(flat, expected):
+    """And by any rule of splitting, with any threads, after a refit, and without the first eight rays."""
     vertices, faces = flat
-    octree = Octree(vertices[:, [0, 2, 1]] * [1.0, 3.0, 0.5], faces)
-    octree.refit(vertices)
-    assert_same_hits(octree.closest_hit(*beside(1e-12)), expected)
-
-
-def test_rays_beside_a_plane_hit_the_same_without_the_first_eight(flat, expected):
+    refitted = Octree(vertices[:, [0, 2, 1]] * [1.0, 3.0, 0.5], faces)
+    refitted.refit(vertices)
+    octrees = [Octree(*flat, split=split, threads=threads) for split in ("midpoint", "sah") for threads in (2, 3)]
     origins, directions = beside(1e-12)
-    hits = Octree(*flat).closest_hit(origins[8:], directions[8:])
-    for name in ("t", "face", "u", "v"):
-        np.testing.assert_array_equal(getattr(hits, name), getattr(expected, name)[8:])
+    for queries in (BruteForce(*flat), refitted, *octrees):
+        assert_same_hits(queries.closest_hit(origins, directions), expected)
+        hits = queries.closest_hit(origins[8:], directions[8:])
+        for name in ("t", "face", "u", "v"):
+            np.testing.assert_array_equal(getattr(hits, name), getattr(expected, name)[8:])
 
 
 @cases("factor", [1 - 1e-6, 1 - 1e-9, 1.0, 1 + 1e-9, 1 + 1e-6])
@@ -142,7 +125,7 @@ def flattened(seed, count, kind):
     return vertices, faces
 
 
-@settings(max_examples=400)
+@settings(max_examples=200)
 @given(
     st.sampled_from(["soup", "soup_float32", "lattice", "duplicates", "sizes", "flat", "far_away", "scaled"]),
     st.integers(0, 2**20),
@@ -243,17 +226,3 @@ def test_a_hit_beyond_doubt_lies_within_its_own_box_and_so_within_all(seed):
     assert found[counted, 3].all()
     assert (found[counted, 2] > found[counted, 1]).any()
     assert (found[counted, 2] < found[counted, 1]).any()
-
-
-def test_threads_share_such_rays_in_any_way(flat):
-    rays = [np.tile(part, (2, 1)) for part in beside(1e-9)]
-    octree = Octree(*flat, threads=2)
-    expected = Octree(*flat, threads=1).closest_hit(*rays)
-    with ThreadPoolExecutor(3) as callers:
-        for hits in callers.map(lambda _: octree.closest_hit(*rays), range(4)):
-            assert_same_hits(hits, expected)
-
-
-def test_rays_at_meshes_still_agree(flat):
-    rays = rays_at(*flat, 3, 400)
-    assert_same_hits(Octree(*flat).closest_hit(*rays), BruteForce(*flat).closest_hit(*rays))

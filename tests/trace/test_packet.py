@@ -33,7 +33,7 @@ def fans(vertices, faces, seed, fans=6):
     return origins + (np.abs(vertices).max(initial=0.0) + 1.0) * shift * rng.normal(size=origins.shape), directions
 
 
-@settings(max_examples=500)
+@settings(max_examples=200)
 @given(meshes, options, SEEDS)
 def test_fans_equal_brute_force_bit_for_bit(mesh, chosen, seed):
     octree, brute = Octree(*mesh, **chosen), BruteForce(*mesh, threads=1)
@@ -97,7 +97,7 @@ def _prepare_both(rays, numbers, together, alone):
         prepare_ray(Prepared(pointer(floats), pointer(doubles), pointer(integers)), 8 + k, ray, t_max)
 
 
-@cases("seed", range(40))
+@cases("seed", range(10))
 def test_eight_rays_are_prepared_as_each_is_alone(seed):
     """Bit for bit: directions along axes, of equal components and of -0.0, origins and bounds of any size."""
     rng = np.random.default_rng(seed)
@@ -153,7 +153,7 @@ def _beam_and_rays(nodes, origins, directions, t_max):
     return _meet_beam_and_rays(nodes, origins, directions, t_max, room)
 
 
-@cases("seed", range(12))
+@cases("seed", range(6))
 def test_a_beam_meets_every_box_that_one_of_its_rays_meets(seed):
     rng = np.random.default_rng(seed)
     met = missed = 0

@@ -55,39 +55,8 @@ def test_each_ray_tests_the_faces_of_the_leaves_that_it_opens(leaf_size):
     assert told > 0.9 * len(origins)
 
 
-def test_a_tree_of_one_leaf_tests_its_faces():
-    octree = Octree(*make_mesh("soup", 5, 3))
-    steps = octree.count_steps(octree.mesh.triangles.mean(axis=1) - [0, 0, 1e-3], [0.0, 0.0, 1.0])
-    assert set(steps.nodes.tolist()) == {1} and set(steps.triangles.tolist()) <= {1, 2, 3}
-
-
 def test_brute_force_tests_all_and_misses_nothing():
     # 317 faces do not fill the last block.
     for mesh in (icosphere(2), Mesh(icosphere(2).vertices, icosphere(2).faces[:-3])):
         steps = BruteForce.from_mesh(mesh).count_steps(np.zeros((2, 5, 3)), [0.0, 0.0, 1.0])
         assert steps.nodes.shape == (2, 5) and not steps.nodes.any() and (steps.triangles == len(mesh.faces)).all()
-
-
-def test_a_bound_spares_steps_and_bad_rays_are_named():
-    octree, rays = Octree.from_mesh(icosphere(4)), (np.tile([0.0, 0.1, 3.0], (3000, 1)), [0.01, 0.0, -1.0])
-    whole, none = octree.count_steps(*rays), octree.count_steps(*rays, t_max=0.5)
-    assert (whole.nodes > none.nodes).all() and (none.triangles == 0).all() and (whole.nodes == whole.nodes[0]).all()
-    origins = np.array(rays[0])
-    origins[2500, 1] = np.nan
-    with pytest.raises(ValueError, match=r"origins: expected finite numbers .* in row 2500"):
-        octree.count_steps(origins, rays[1])
-
-
-def test_what_lies_before_t_min_is_not_searched():
-    octree, rays = Octree.from_mesh(icosphere(4)), ([[0.0, 0.1, 3.0]], [[0.01, 0.0, -1.0]])
-    whole, none = octree.count_steps(*rays), octree.count_steps(*rays, t_min=9.0)
-    assert whole.triangles[0] > 0 and none.nodes[0] == 1 and none.triangles[0] == 0
-
-
-def test_faces_are_left():
-    corners = np.array([[-1.0, -1, 0], [3, -1, 0], [-1, 3, 0]])
-    octree = Octree(np.concatenate([corners, np.add(corners, [0, 0, 1])]), [[0, 1, 2], [3, 4, 5]], leaf_size=1)
-    rays = [[0.25, 0.25, 0.0]], [[0.0, 0.0, 1.0]]
-    whole, left = octree.count_steps(*rays), octree.count_steps(*rays, leaving=0)
-    # A ray that hits the face that it starts on ends there; one that leaves it goes on to the next.
-    assert whole.triangles.tolist() == [1] and left.triangles.tolist() == [2]

@@ -8,7 +8,7 @@ from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, icosphere, torus
 from renderer.octree import BruteForce, Octree
 
-COUNT = 100_000
+COUNT = 20_000
 
 
 def aimed(mesh, inside, seed):

@@ -1,7 +1,6 @@
 """Octrees in files: the same bits again, nothing copied from a map, and one clear error for any other content."""
 
 import copy
-import doctest
 import errno
 import json
 import os
@@ -21,8 +20,7 @@ from meshes import answers, make_mesh, rays_at
 from numpy.typing import NDArray
 from signatures import SIGNATURES
 
-from renderer import Mesh, Octree, octree
-from renderer import queryable as queries
+from renderer import Mesh, Octree
 from renderer.mesh.shapes import icosphere
 from renderer.system import files
 from renderer.trace.layout import BLOCK_WORDS, CACHE_LINE, CHILDREN, NODE_WORDS
@@ -92,17 +90,6 @@ def test_a_loaded_octree_is_the_one_that_was_saved(kind: str, mmap: bool, path: 
         assert ours is None or not ours.flags.writeable
     assert loaded.mesh.name == saved.mesh.name
     assert str(loaded.repairs) == str(saved.repairs)
-
-
-@MAPPED
-def test_repairs_come_back(mmap: bool, path: Path) -> None:
-    saved = repaired()
-    saved.save(path)
-    loaded = Octree.load(path, mmap=mmap)
-    assert loaded.repairs is not None and saved.repairs is not None and len(saved.repairs.dropped_faces) == 1
-    for name in ("dropped_faces", "bad_vertices", "kept_faces", "bad_normals"):
-        np.testing.assert_array_equal(getattr(loaded.repairs, name), getattr(saved.repairs, name))
-        assert not getattr(loaded.repairs, name).flags.writeable
 
 
 @MAPPED
@@ -636,9 +623,3 @@ def test_mmap_is_true_or_false(bad: Any, path: Path) -> None:
 def test_threads_are_checked_before_the_file() -> None:
     with pytest.raises(ValueError, match=r"^threads: expected an integer >= 1 or None, got 0"):
         Octree.load("absent", threads=0)
-
-
-@pytest.mark.parametrize("module", [octree, queries], ids=lambda module: module.__name__)
-def test_examples_in_the_docstrings_hold(module: Any) -> None:
-    results = doctest.testmod(module)
-    assert results.attempted > 10 and results.failed == 0
