@@ -6,7 +6,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -53,17 +52,6 @@ def write_package(parent: Path) -> Path:
     for name in ("bottom", "aside"):
         (folder / "below" / "deep" / f"{name}.py").write_text("STEP = 10\n")
     return folder
-
-
-def copy_package(parent: Path) -> Path:
-    """Copy the whole package into ``parent``, and the kernels that are compiled by now, so that few need be again."""
-
-    def copy_file(source: str, target: str) -> None:
-        with suppress(FileNotFoundError):  # another process may replace a compiled kernel just now
-            shutil.copy2(source, target)
-
-    ignored = shutil.ignore_patterns("*.pyc")
-    return Path(shutil.copytree(PACKAGE, parent / "renderer", ignore=ignored, copy_function=copy_file))
 
 
 def bottom_of(folder: Path) -> Path:

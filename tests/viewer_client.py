@@ -10,9 +10,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from PIL import Image as Pillow
 from viewer_page import MODELS, SCENE
+
+pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
+
 from websockets.sync.client import connect
 
 from renderer import render
@@ -128,6 +132,12 @@ def rendered(scene: Scene, eye: tuple[float, float, float] = (0.5, 2.6, 5.5), **
     view = looking(eye)
     seen = scene.model_copy(update={"camera": camera_of(view["m"], view["fovy"])})
     return render(seen, **{"resolution": (200, 150), "max_depth": 6, **options})
+
+
+def seen_by(shown: dict[str, Any], scene: Scene, **options: Any) -> Any:
+    """What ``render`` gives for the camera and the size that a page reports."""
+    camera = camera_of(shown["m"], shown["fovy"], height=shown.get("height"))
+    return render(scene, camera=camera, **{"resolution": (shown["w"], shown["h"]), **options})
 
 
 def fetched(url: str, path: str) -> bytes:

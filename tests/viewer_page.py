@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -137,12 +137,18 @@ class Viewer:
         self.page.on("request", self._check_request)
         self.url = url
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.context.close()
+
     def _check_request(self, request: Any) -> None:
         address = urlsplit(request.url)
         if address.scheme not in ("blob", "data") and address.hostname != "127.0.0.1":
             self.faults.append(f"a request to {request.url}")
 
-    def open(self) -> "Viewer":
+    def open(self) -> Self:
         self.page.goto(self.url)
         self.page.wait_for_selector("body[data-ready]")
         self.settled("octree")

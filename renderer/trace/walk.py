@@ -17,15 +17,15 @@ def stack_size(depth: int) -> int:
 
 
 @inlined
-def first_block(leaf):
-    """The first block of a leaf."""
-    return ~leaf >> LEAF_BITS
+def blocks_of(leaf):
+    """The first block of a leaf, and how many it has. Python calls ``blocks_of.py_func``, for arrays too."""
+    return ~leaf >> LEAF_BITS, (~leaf & (MAX_LEAF_BLOCKS - 1)) + 1
 
 
 @inlined
-def blocks_of(leaf):
-    """The first block of a leaf, and how many it has."""
-    return first_block(leaf), (~leaf & (MAX_LEAF_BLOCKS - 1)) + 1
+def first_block(leaf):
+    """The first block of a leaf."""
+    return blocks_of(leaf)[0]
 
 
 @inlined

@@ -226,14 +226,6 @@ def test_indices_out_of_range_are_refused_or_repaired(index: Any, corner: int) -
         assert built.repairs is not None and built.repairs.dropped_faces.tolist() == [4]
 
 
-@pytest.mark.parametrize("accelerator", [OCTREE, BRUTE], ids=["octree", "brute"])
-def test_an_interval_without_numbers_holds_no_hit(accelerator: Any) -> None:
-    for t_min, t_max in ((2.0, 1.0), (np.finfo(float).max, 0.0), (np.full(COUNT, 9.0), np.full(COUNT, 8.5))):
-        hits = accelerator.closest_hit(ORIGINS, DIRECTIONS, t_min, t_max)
-        assert (hits.face == -1).all() and np.isinf(hits.t).all() and np.isnan(hits.u).all() and np.isnan(hits.v).all()
-        assert not accelerator.any_hit(ORIGINS, DIRECTIONS, t_min, t_max).any()
-
-
 POINT_OPTIONS: dict[str, list[Any]] = {
     "tolerance": [None, -1, np.nan, np.inf, "1e-3", [1e-3], True, 1j, 10**400],
     "winding": [None, 0, 1.0, "true", [True], np.array([True, False])],
@@ -386,19 +378,6 @@ def test_no_faces_are_missed_by_all(accelerator: Any, vertices: Any) -> None:
     assert isinstance(found, AllHits) and not len(found.t) and not found.counts.any()
 
 
-# --- Hits, Mesh and their sizes -------------------------------------------------------------------------------
-
-
-@cases("exponent", [-1000, -700, -200, -60, 0, 60, 200, 700, 1000])
-@cases("accelerator", [Octree, BruteForce])
-def test_a_hit_has_a_point_and_a_normal_at_any_size(accelerator: Any, exponent: int) -> None:
-    vertices = np.ldexp([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], exponent)
-    hits = accelerator(vertices, [[0, 1, 2]]).closest_hit(np.ldexp([[0.25, 0.25, 1.0]], exponent), [[0, 0, -1.0]])
-    assert hits.hit.tolist() == [True] and hits.t.tolist() == [2.0**exponent]
-    assert hits.points.tolist() == np.ldexp([[0.25, 0.25, 0.0]], exponent).tolist()
-    assert hits.normals.tolist() == [[0, 0, 1]]
-
-
 @cases("scale", [1e-300, 1e-160, 1.0, 1e160, 1e300])
 @cases("mirror", [1, -1])
 def test_maps_of_any_size_keep_outside_outside(scale: float, mirror: int) -> None:
@@ -410,9 +389,7 @@ def test_maps_of_any_size_keep_outside_outside(scale: float, mirror: int) -> Non
     np.testing.assert_allclose(moved.normals, expected.normals, rtol=4e-15, atol=1e-15)
 
 
-def test_a_map_that_overflows_is_refused_without_a_warning() -> None:
-    with pytest.raises(MeshError, match=r"^vertices: expected finite values, got \[.*\] in row \d"):
-        BOX.transformed(np.diag([1e308, 1e308, 1e308, 1])).transformed(np.diag([1e10, 1, 1, 1]))
+# --- Hits, Mesh and their sizes -------------------------------------------------------------------------------
 
 
 NOT_MESHES = [None, "x", 3, np.ones((3, 3)), [BOX], Mesh, {"vertices": []}]
@@ -428,14 +405,6 @@ class TestWhatIsNoMesh:
     def test_concatenate(self, bad: Any) -> None:
         with pytest.raises(MeshError, match=r"^pot: meshes: expected an iterable of Mesh, got .* in row 1"):
             Mesh.concatenate([BOX, bad], name="pot")
-
-    def test_names(self, bad: Any, tmp_path: Path) -> None:
-        if isinstance(bad, str):
-            assert Mesh(BOX.vertices, BOX.faces, name=bad).name == bad
-            return
-        for call in (Mesh, Mesh.repaired):
-            with pytest.raises(MeshError, match=r"^name: expected a string, got"):
-                call(BOX.vertices, BOX.faces, name=bad)
 
 
 @cases("bad", [None, 3, "x", BOX, np.array(3)])
@@ -605,12 +574,6 @@ def test_each_class_of_a_scene_says_on_one_line_what_is_wrong(
     assert field in message or "non-zero length" in message or "min < max" in message
 
 
-def test_a_prepared_scene_has_a_class_and_the_package_a_version() -> None:
-    assert isinstance(PREPARED, renderer.PreparedScene)
-    assert re.fullmatch(r"\d+\.\d+\.\d+", renderer.__version__)
-    assert renderer.srgb(np.array([0.0, 1.0, np.inf])).tolist() == [0, 255, 255]
-
-
 @cases("bad", [{}, "x", None, [[1.0], [2.0, 3.0]], [1j]])
 def test_srgb_takes_numbers_only(bad: Any) -> None:
     with pytest.raises(ValueError, match=r"^linear: expected "):
@@ -674,27 +637,4 @@ def test_each_number_of_a_scene(path: tuple[Any, ...], bad: Any) -> None:
     assert str(path[-1]) in str(caught.value)
 
 
-def test_the_good_scene_is_good() -> None:
-    image = render(Scene.model_validate(GOOD_SCENE), threads=1)
-    assert np.isfinite(image.radiance).all() and (image.face >= 0).any()
-
-
 # --- nothing is left out --------------------------------------------------------------------------------------
-
-
-def test_every_public_name_is_met_here() -> None:
-    """A new public name needs a row in this file: beyond the imports each stands in a call or an error."""
-    body = Path(__file__).read_text(encoding="utf-8").partition("VERTICES, FACES")[2]
-    missing = [name for name in renderer.__all__ if not re.search(rf"\b{name}\b", body)]
-    assert not missing
-
-
-def test_repairs_say_what_was_dropped() -> None:
-    """RepairWarning is what load_mesh issues (test_repair.py); Repairs is what the arrays' road gives back; CutWarning
-    is what render issues (test_stopping.py).
-    """
-    assert issubclass(renderer.RepairWarning, UserWarning)
-    assert issubclass(renderer.CutWarning, UserWarning)
-    octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0], [np.nan, 0, 0]], [[0, 1, 2], [0, 1, 3]], repair=True)
-    assert isinstance(octree.repairs, renderer.Repairs)
-    assert octree.repairs.dropped_faces.tolist() == [1]

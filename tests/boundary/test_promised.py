@@ -4,7 +4,6 @@ import doctest
 import inspect
 import io
 import json
-import struct
 import sys
 import time
 import tracemalloc
@@ -20,7 +19,6 @@ import igl
 import numpy as np
 import pytest
 import trimesh
-from numpy.typing import NDArray
 
 import renderer
 from renderer import (
@@ -37,14 +35,13 @@ from renderer import (
     PointLight,
     Scene,
     SceneObject,
-    load_mesh,
     load_scene,
     needs_of,
     prepare,
     render,
 )
 from renderer.cli.main import main
-from renderer.mesh.shapes import grid, icosphere
+from renderer.mesh.shapes import icosphere
 from renderer.picture import prepare as preparing
 from renderer.shade import records
 from renderer.system.threads import available_threads
@@ -178,21 +175,6 @@ def test_the_examples_of_all_docstrings_hold() -> None:
     assert runner.tries > 50 and runner.failures == 0
 
 
-@pytest.mark.judges("Octree.visible")
-def test_what_is_seen_at_the_least_angles_does_not_hide_its_own_points() -> None:
-    """Points of a plain of many faces, turned at random, each with an eye that barely stands above it."""
-    rng, plain = np.random.default_rng(6), grid(12, 12)
-    for far in 10.0 ** rng.uniform(-3, 4, 60):
-        mesh = Mesh(plain.vertices @ np.linalg.qr(rng.normal(size=(3, 3)))[0].T, plain.faces)
-        points, normals = mesh.triangles.mean(axis=1), mesh.face_normals()
-        along = np.cross(normals, rng.normal(size=points.shape))
-        along *= far / np.linalg.norm(along, axis=1)[:, None]
-        eyes = points + along + normals * far * 10.0 ** rng.uniform(-8, -3, (len(points), 1))
-        octree, faces = Octree.from_mesh(mesh), np.arange(len(points))
-        assert octree.visible(points, eyes).all() and octree.visible(eyes, points).all()
-        assert octree.visible(points, eyes, leaving=faces).all() and octree.visible(eyes, points, reaching=faces).all()
-
-
 @pytest.mark.judges("AllHits.ray")
 def test_rays_of_several_dimensions_are_counted_in_c_order() -> None:
     origins = np.array([[[0.0, 0.0, 3.0], [9.0, 0.0, 3.0]], [[0.1, 0.0, 3.0], [0.2, 0.0, 3.0]]])
@@ -229,13 +211,6 @@ def test_signs_of_distances_are_those_of_libigl_and_not_of_trimesh() -> None:
     assert np.allclose(ours, -theirs, atol=1e-7)
 
 
-@pytest.mark.judges("ClosestPoints")
-def test_u_and_v_of_nearest_points_weigh_the_second_and_third_corner() -> None:
-    mesh = Mesh([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 8.0, 0.0]], [[0, 1, 2]])
-    found = Octree.from_mesh(mesh).closest_point([[1.0, 2.0, 5.0], [3.0, -1.0, 1.0]])
-    assert found.u.tolist() == [0.25, 0.75] and found.v.tolist() == [0.25, 0.0]
-
-
 @pytest.mark.judges("BruteForce.mesh", "Octree.mesh")
 def test_the_mesh_of_a_tree_is_the_one_built_over_and_then_the_moved_one() -> None:
     mesh = icosphere(1)
@@ -256,9 +231,6 @@ def test_a_refit_keeps_what_belongs_to_vertices() -> None:
         assert np.array_equal(getattr(octree.mesh, name), getattr(full, name))
 
 
-# Meshes
-
-
 @pytest.mark.judges("Mesh")
 def test_meshes_compare_and_hash_by_identity() -> None:
     first, second = icosphere(0), icosphere(0)
@@ -270,6 +242,9 @@ def test_closed_is_told_by_index() -> None:
     mesh = icosphere(0)
     soup = Mesh(mesh.triangles.reshape(-1, 3), np.arange(3 * len(mesh.faces)).reshape(-1, 3))
     assert mesh.is_closed() and not soup.is_closed()
+
+
+# Meshes
 
 
 @pytest.mark.judges("Mesh.triangles")
@@ -309,55 +284,6 @@ def test_joined_meshes_have_texture_coordinates_where_all_have_them() -> None:
     joined = Mesh.concatenate([mapped, mapped]).texcoords
     assert joined is not None and np.array_equal(joined, np.tile(ball.vertices[:, :2], (2, 1)))
     assert Mesh.concatenate([mapped, ball]).texcoords is None
-
-
-def glb(material: bool, attributes: dict[str, NDArray[Any]]) -> bytes:
-    """A GLB file of one triangle, put together by its specification."""
-    columns = {"POSITION": np.eye(3, dtype=np.float32), **attributes}
-    kinds = {np.dtype(np.float32): 5126, np.dtype(np.uint8): 5121}
-    data, views, accessors = b"", [], []
-    for array in columns.values():
-        views.append({"buffer": 0, "byteOffset": len(data), "byteLength": array.nbytes})
-        entry = {
-            "bufferView": len(accessors),
-            "componentType": kinds[array.dtype],
-            "count": 3,
-            "type": f"VEC{array.shape[1]}",
-        }
-        accessors.append({**entry, "normalized": array.dtype == np.uint8})
-        data += array.tobytes()
-    accessors[0] |= {"min": [0, 0, 0], "max": [1, 1, 1]}
-    primitive: dict[str, Any] = {"attributes": {name: at for at, name in enumerate(columns)}}
-    told = {
-        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [primitive | ({"material": 0} if material else {})]}],
-        "materials": [{"pbrMetallicRoughness": {}}], "accessors": accessors, "bufferViews": views,
-        "buffers": [{"byteLength": len(data)}],
-    }  # fmt: skip
-    text = json.dumps(told).encode()
-    text += b" " * (-len(text) % 4)
-    size = 12 + 8 + len(text) + 8 + len(data)
-    start = struct.pack("<4sII", b"glTF", 2, size) + struct.pack("<I4s", len(text), b"JSON")
-    return start + text + struct.pack("<I4s", len(data), b"BIN\0") + data
-
-
-@pytest.mark.judges("load_mesh")
-@pytest.mark.parametrize("material", [False, True])
-def test_a_glb_keeps_colours_without_and_texture_coordinates_with_a_material(tmp_path: Path, material: bool) -> None:
-    colors, uv = (
-        np.array([[255, 0, 0, 255], [0, 51, 0, 255], [0, 0, 255, 255]], np.uint8),
-        np.eye(3, 2, dtype=np.float32),
-    )
-    (tmp_path / "a.glb").write_bytes(glb(material, {"COLOR_0": colors, "TEXCOORD_0": uv}))
-    mesh = load_mesh(tmp_path / "a.glb")
-    assert np.array_equal(mesh.vertices, np.eye(3))
-    if material:
-        # A texture's origin is its upper left in a GLB file, and its lower left here.
-        assert mesh.colors is None and mesh.texcoords is not None
-        assert np.array_equal(mesh.texcoords, uv * [1, -1] + [0, 1])
-    else:
-        assert mesh.texcoords is None and mesh.colors is not None
-        assert np.array_equal(mesh.colors, np.float32(colors[:, :3] / 255))
 
 
 # Scenes and pictures
@@ -407,23 +333,6 @@ def test_a_prepared_scene_holds_what_it_says() -> None:
         assert getattr(prepared.needs, feature.name) >= getattr(needs_of(scene), feature.name), feature.name
     assert image.build_seconds == prepared.build_seconds > 0.0 < image.render_seconds
     assert prepared.build_seconds + brute.build_seconds + image.render_seconds <= elapsed
-
-
-@pytest.mark.judges("octree-render render --split", "render")
-@pytest.mark.parametrize("split", ["midpoint", "sah"])
-def test_split_is_that_of_the_tree(split: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pictures are the same either way, so the tree is watched."""
-    built = []
-    from_mesh = Octree.from_mesh
-
-    def watched(mesh: Mesh, **options: Any) -> Octree:
-        built.append(options["split"])
-        return from_mesh(mesh, **options)
-
-    monkeypatch.setattr(preparing.Octree, "from_mesh", watched)
-    render(load_scene(GLASS), resolution=SIZE, split=split)
-    assert main(["render", str(GLASS), "--resolution", "9x9", "--split", split, "-o", str(tmp_path / "a.npy")]) == 0
-    assert built == [split, split]
 
 
 @pytest.mark.judges("Scene.altered")
@@ -478,16 +387,6 @@ def test_render_and_prepare_hand_on_their_options(monkeypatch: pytest.MonkeyPatc
     assert workers == [3, available_threads(), 2] and built[-1] == ("midpoint", available_threads())
 
 
-@pytest.mark.judges("prepare")
-@pytest.mark.parametrize(
-    ("argument", "value"),
-    [("accelerator", "bvh"), ("split", "kd"), ("split", None), ("needs", {}), ("threads", 0), ("threads", 1.5)],
-)
-def test_prepare_refuses_what_it_does_not_know_and_names_it(argument: str, value: Any) -> None:
-    with pytest.raises(ValueError, match=f"^{argument}: expected .* got "):
-        prepare(load_scene(GLASS), **{argument: value})
-
-
 # Commands
 
 
@@ -516,17 +415,6 @@ def test_quiet_shows_no_bar_on_a_terminal(tmp_path: Path, monkeypatch: pytest.Mo
     assert main([*given, "--quiet"] if quiet else given) == 0
     assert ("tile" in shown.getvalue()) == ("70 x 40" in said.getvalue()) == (not quiet)
     assert not quiet or shown.getvalue() == said.getvalue() == ""
-
-
-@pytest.mark.judges("octree-render render --max-rays")
-def test_max_rays_of_the_command_is_that_of_the_library(tmp_path: Path) -> None:
-    path = tmp_path / "a.npy"
-    assert main(["render", str(GLASS), "--resolution", "24x16", "--max-rays", "3", "-o", str(path), "--quiet"]) == 0
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", CutWarning)
-        cut = render(load_scene(GLASS), resolution=SIZE, max_rays=3).radiance
-    assert np.array_equal(np.load(path), cut)
-    assert not np.array_equal(cut, render(load_scene(GLASS), resolution=SIZE).radiance)
 
 
 @pytest.mark.judges(
@@ -563,17 +451,6 @@ def test_what_the_command_is_told_is_handed_on_and_the_rest_left_to_the_library(
     for options, said in zip(told, expected, strict=True):
         assert {name: options[name] for name in said} == said
     assert [path.name for path in tmp_path.iterdir()] == ["out.png"]
-
-
-@pytest.mark.judges("octree-render render --max-depth", "octree-render render --min-weight")
-@pytest.mark.parametrize("flags", [("--max-depth", "1"), ("--min-weight", "0.3")])
-def test_a_bound_of_the_command_is_that_of_the_library(tmp_path: Path, flags: tuple[str, str]) -> None:
-    path, name = tmp_path / "a.npy", flags[0].strip("-").replace("-", "_")
-    assert main(["render", str(GLASS), "--resolution", "24x16", *flags, "-o", str(path), "--quiet"]) == 0
-    bound: dict[str, Any] = {name: float(flags[1]) if "." in flags[1] else int(flags[1])}
-    expected = render(load_scene(GLASS), resolution=SIZE, **bound).radiance
-    assert np.array_equal(np.load(path), expected)
-    assert not np.array_equal(expected, render(load_scene(GLASS), resolution=SIZE).radiance)
 
 
 @pytest.mark.judges("octree-render view --host", "octree-render view --port", "octree-render view scene")
@@ -694,10 +571,10 @@ def test_compile_compiles_what_it_is_told_and_all_by_default(what: str | None, m
 @pytest.mark.judges("octree-render compile --quiet")
 def test_compile_is_quiet_on_a_terminal(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     from renderer import precompile
-    from renderer.cli import main as cli
+    from renderer.cli import compiling
 
     monkeypatch.setattr(precompile, "compile_ahead", lambda what, began: [began(str(part)) for part in "ab"])
-    monkeypatch.setattr(cli, "on_terminal", lambda: True)
+    monkeypatch.setattr(compiling, "on_terminal", lambda: True)
     assert main(["compile", "--quiet"]) == 0
     assert capfd.readouterr() == ("", "")
     assert main(["compile"]) == 0

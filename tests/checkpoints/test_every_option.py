@@ -1,11 +1,8 @@
 """Each option of ``octree-render study``, given alone: what is asked, what a run of it keeps, and what is written."""
 
 import argparse
-import json
-import shutil
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
-from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -15,8 +12,9 @@ import pytest
 import tomlkit
 from cases import cases
 from scenery import scenery
+from watched import results_here
 
-from renderer import Mesh, Octree, load_mesh
+from renderer import Octree, load_mesh
 from renderer.checkpoints.study import KINDS
 from renderer.cli.main import main, make_parser
 from renderer.mesh.load import save_ply
@@ -44,13 +42,8 @@ BITLESS: dict[str, list[str]] = {
     "--threads": ["--threads", "1"],
     "--quiet": ["--quiet"],
 }
-# What changes the points.
-PLACES: dict[str, list[str]] = {
-    "--grid": ["--grid", "0.7"],
-    "--points": ["--points", "{}/points.npy"],
-    "--points with normals": ["--points", "{}/normals.npy"],
-    "mesh": ["other.ply"],
-}
+# What changes the points: below, and in test_written_files.py.
+PLACES = {"--grid", "--points", "mesh"}
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +52,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("study")
     mesh = scenery()
     save_ply(mesh, folder / "mesh.ply")
-    save_ply(Mesh(mesh.vertices + np.eye(len(mesh.vertices), 3) * 2.0**-9, mesh.faces), folder / "other.ply")
     (folder / "suns.txt").write_text("1 0.2 0.7 2\n-0.6 0.5 0.4 3.5\n")
     (folder / "more.txt").write_text("1 0.2 0.7 2\n0 0.5 0.4 1\n")
     points = np.array([[0.5, 0.5, 0.25], [-1.0, 0.75, 0.5], [0.1, 0.2, 2.0]])
@@ -76,37 +68,28 @@ def bars() -> list[bool]:
 
 
 @pytest.fixture(autouse=True)
-def asked(monkeypatch: pytest.MonkeyPatch, bars: list[bool]) -> list[str]:
-    """The plans of runs, which answer as ever; the cluster is this process."""
-    asked: list[str] = []
+def in_this_process(monkeypatch: pytest.MonkeyPatch, bars: list[bool]) -> None:
+    """The cluster is this process; runs answer as ever."""
 
-    def told(of: Callable[..., Any], first: int) -> Callable[..., Any]:
+    def told(of: Callable[..., Any]) -> Callable[..., Any]:
         def run(*arguments: Any, **options: Any) -> Any:
-            octree, study, points = arguments[first : first + 3]
-            asked.append(json.dumps(asdict(study.plan(octree.mesh, points, points.order()))))
             bars.append(options["progress"])
             return of(*arguments, **options)
 
         return run
 
-    def results(_client: object, function: Callable[..., Any], tasks: Iterable[Any]) -> Iterator[tuple[Any, Any]]:
-        for task in tasks:
-            yield task.name, function(task.shared, *task.arguments)
-
     here, there = import_module("renderer.checkpoints.study"), import_module("renderer.cluster.studies")
-    monkeypatch.setattr(there, "results", results)
-    monkeypatch.setattr(here, "run", told(here.run, 0))
-    monkeypatch.setattr("renderer.cluster.run_on", told(there.run_on, 1))
+    monkeypatch.setattr(there, "results", results_here)
+    monkeypatch.setattr(here, "run", told(here.run))
+    monkeypatch.setattr("renderer.cluster.run_on", told(there.run_on))
     monkeypatch.setattr("renderer.cli.study.on_cluster", lambda options: nullcontext())
-    return asked
 
 
 def study(folder: Path, kind: str, words: Sequence[str], output: Path) -> int:
     """The exit code of the command, of a kind with the usual files and quiet."""
-    told = [word.replace("{}", str(folder)) for word in words if word != "other.ply"]
+    told = [word.replace("{}", str(folder)) for word in words]
     told += ["--suns", str(folder / "suns.txt")] if kind == "sun" and "--suns" not in words else []
-    mesh = folder / ("other.ply" if "other.ply" in words else "mesh.ply")
-    return main(["study", kind, str(mesh), "-o", str(output), "--quiet", *told])
+    return main(["study", kind, str(folder / "mesh.ply"), "-o", str(output), "--quiet", *told])
 
 
 def on_faces(folder: Path, kind: str, **given: Any) -> Any:
@@ -157,43 +140,6 @@ def test_points_of_a_file_are_answered_with_their_normals(folder: Path, tmp_path
 def killed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Commands end before they remove the parts of their runs."""
     monkeypatch.setattr("renderer.checkpoints.parts.remove_parts", lambda folder: None)
-
-
-def refused(capsys: pytest.CaptureFixture[str], *told: Any) -> bool:
-    """Whether the command ends because parts of another run are there."""
-    return study(*told) == 2 and "got those of another, whose" in capsys.readouterr().err
-
-
-def test_no_run_takes_over_the_parts_of_another(
-    folder: Path, tmp_path: Path, killed: None, asked: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Whatever option of it is another one: also where it has no part in common."""
-    runs = {kind: (kind, list[str]()) for kind in KINDS}
-    runs |= {name: (kind, words) for name, (kind, words, _) in FUNCTIONS.items()}
-    runs |= {name: ("sky", words) for name, words in PLACES.items()}
-    for name, (kind, words) in runs.items():
-        assert study(folder, kind, words, tmp_path / f"{name}.npy") == 0
-        assert name == "sky" or refused(capsys, folder, kind, words, tmp_path / "sky.npy")
-    assert len(set(asked)) == len(runs)
-
-
-@pytest.mark.parametrize(
-    ("words", "file", "other"),
-    [([], "mesh.ply", "other.ply"), (PLACES["--points"], "points.npy", "normals.npy"), ([], "suns.txt", "more.txt")],
-)
-def test_no_run_takes_over_the_parts_of_a_file_as_it_was(
-    folder: Path,
-    tmp_path: Path,
-    killed: None,
-    capsys: pytest.CaptureFixture[str],
-    words: list[str],
-    file: str,
-    other: str,
-) -> None:
-    own = Path(shutil.copytree(folder, tmp_path / "files"))
-    assert study(own, "sun", words, tmp_path / "a.npy") == 0
-    shutil.copy(own / other, own / file)
-    assert refused(capsys, own, "sun", words, tmp_path / "a.npy")
 
 
 @pytest.mark.parametrize("name", BITLESS)

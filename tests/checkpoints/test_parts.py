@@ -101,20 +101,6 @@ def test_a_manifest_that_is_none_is_refused(tmp_path: Path, text: str) -> None:
         Parts(tmp_path, PLAN)
 
 
-def test_rows_of_several_values_and_no_rows(tmp_path: Path) -> None:
-    bits = Plan(rows=3, size=2, width=5, dtype="|u1", made_of={})
-    values = np.arange(15, dtype=np.uint8).reshape(3, 5)
-    parts = Parts(tmp_path / "bits", bits)
-    parts.write(0, values[:2])
-    parts.write(1, values[2:])
-    parts.join(tmp_path / "bits.npy")
-    assert (np.load(tmp_path / "bits.npy") == values).all()
-    none = Parts(tmp_path / "none", replace(PLAN, rows=0))
-    none.write(0, np.empty(0))
-    none.join(tmp_path / "none.npy")
-    assert np.load(tmp_path / "none.npy").shape == (0,)
-
-
 def test_digests_tell_shapes_types_and_bytes_apart() -> None:
     arrays = [np.zeros(4), np.zeros((2, 2)), np.zeros(8, np.float32), np.array([0.0, 0.0, 0.0, -0.0])]
     assert len({digest_of(a) for a in arrays} | {digest_of(arrays[0], arrays[0])}) == 5

@@ -1,11 +1,16 @@
-"""``octree-render study``: its results are those of the library, in each format, and survive a kill."""
+"""``octree-render study``: what it says, writes and refuses, and that it survives a kill.
+
+Its answers are in test_every_option.py, the files that it writes in test_written_files.py.
+"""
 
 import os
 import signal
 import subprocess
 import sys
 import time
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,20 +18,18 @@ from cases import cases
 from PIL import Image as Pillow
 from plyfile import PlyData
 
-from renderer import Octree, load_mesh
+from renderer import Mesh, Octree, load_mesh
 from renderer.checkpoints import study as studies
 from renderer.cli.main import main
 from renderer.mesh.load import save_ply
 from renderer.mesh.shapes import box
-from renderer.studies import face_points, sky_view_factor, sun_hours
+from renderer.studies import sky_view_factor
+from renderer.system.threads import available_threads
 from validation.benchmark.measures.meshes import named
 
 pytestmark = pytest.mark.judges(
-    "octree-render study", "octree-render study --camera", "octree-render study --cluster",
-    "octree-render study --definition", "octree-render study --distance", "octree-render study --faces",
-    "octree-render study --grid", "octree-render study --output", "octree-render study --patches",
-    "octree-render study --points", "octree-render study --resolution", "octree-render study --samples",
-    "octree-render study --suns", "octree-render study kind", "octree-render study mesh",
+    "octree-render study", "octree-render study --output", "octree-render study --quiet",
+    "octree-render study --suns", "octree-render study --threads", "octree-render study mesh",
 )  # fmt: skip
 
 
@@ -37,72 +40,12 @@ def city(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+def study(*arguments: object) -> None:
+    assert main(["study", *map(str, arguments)]) == 0
+
+
 def _run(*arguments: object) -> int:
     return main(["study", *map(str, arguments), "--quiet"])
-
-
-def test_faces_have_what_the_library_says(city: Path, tmp_path: Path) -> None:
-    assert _run("sky", city, "-o", tmp_path / "sky.npy") == 0
-    octree = Octree.from_mesh(load_mesh(city))
-    points, normals, faces = face_points(octree.mesh)
-    expected = np.full(len(octree.mesh.faces), np.nan)
-    expected[faces] = sky_view_factor(octree, points, normals, leaving=faces)
-    np.testing.assert_array_equal(np.load(tmp_path / "sky.npy"), expected)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["sky.npy"]
-
-
-def test_sun_hours_of_a_file_of_suns(city: Path, tmp_path: Path) -> None:
-    (tmp_path / "suns.txt").write_text("# x y z hours\n1, 0, 1, 2.5\n\n-1 0 1 1.5  \n")
-    assert _run("sun", city, "--suns", tmp_path / "suns.txt", "-o", tmp_path / "sun.npy") == 0
-    octree = Octree.from_mesh(load_mesh(city))
-    points, normals, faces = face_points(octree.mesh)
-    expected = sun_hours(octree, points, normals, [[1, 0, 1], [-1, 0, 1]], [2.5, 1.5], leaving=faces)
-    np.testing.assert_array_equal(np.load(tmp_path / "sun.npy")[faces], expected)
-
-
-def test_points_of_a_file_lie_on_no_face(city: Path, tmp_path: Path) -> None:
-    octree = Octree.from_mesh(load_mesh(city))
-    above = octree.mesh.bounds[1] + [0.0, 0.0, 1.0]
-    np.save(tmp_path / "p.npy", np.array([above, above - [0.0, 0.0, 50.0]]))
-    assert _run("sky", city, "--points", tmp_path / "p.npy", "--patches", 577, "-o", tmp_path / "sky.npy") == 0
-    found = np.load(tmp_path / "sky.npy")
-    assert found[0] == 1.0 and found.shape == (2,)
-    np.save(tmp_path / "p.npy", np.array([[*above, 0.0, 0.0, -1.0]]))
-    assert _run("sky", city, "--points", tmp_path / "p.npy", "-o", tmp_path / "down.ply") == 0
-    vertex = PlyData.read(tmp_path / "down.ply")["vertex"]
-    assert vertex["value"].tolist() == [0.0] and vertex["z"].tolist() == [above[2]]
-
-
-def test_a_grid_lies_on_what_is_seen_from_above(tmp_path: Path) -> None:
-    """A cube on a plate: its roof sees all, and points on the plate lie at its height."""
-    plate, cube = box((-4, -4, -1), (4, 4, 0)), box((-1, -1, 0), (1, 1, 2))
-    vertices = np.concatenate([plate.vertices, cube.vertices])
-    faces = np.concatenate([plate.faces, cube.faces + len(plate.vertices)])
-    save_ply(type(plate)(vertices, faces), tmp_path / "m.ply")
-    assert _run("sky", tmp_path / "m.ply", "--grid", 0.5, "-o", tmp_path / "g.ply") == 0
-    vertex = PlyData.read(tmp_path / "g.ply")["vertex"]
-    assert len(vertex["x"]) == 16 * 16
-    roof = (np.abs(vertex["x"]) < 1) & (np.abs(vertex["y"]) < 1)
-    assert roof.sum() == 16 and (vertex["z"][roof] == 2.0).all() and (vertex["z"][~roof] == 0.0).all()
-    assert (vertex["value"][roof] == 1.0).all() and (vertex["value"][~roof] < 1.0).any()
-
-
-def test_a_coloured_mesh_and_a_picture_with_a_legend(city: Path, tmp_path: Path) -> None:
-    assert _run("sky", city, "-o", tmp_path / "faces.ply") == 0
-    assert _run("sky", city, "--vertices", "-o", tmp_path / "vertices.ply") == 0
-    faces, vertices = PlyData.read(tmp_path / "faces.ply"), PlyData.read(tmp_path / "vertices.ply")
-    mesh = load_mesh(city)
-    assert len(faces["face"]["value"]) == len(mesh.faces) and len(vertices["vertex"]["value"]) == len(mesh.vertices)
-    low, high = (np.nanargmin(faces["face"]["value"]), np.nanargmax(faces["face"]["value"]))
-    assert [faces["face"][c][low] for c in ("red", "green", "blue")] == [68, 1, 84]
-    assert [faces["face"][c][high] for c in ("red", "green", "blue")] == [253, 231, 37]
-    assert np.nanmin(faces["face"]["value"]) <= np.nanmin(vertices["vertex"]["value"])
-    assert _run("sky", city, "-o", tmp_path / "sky.png", "--resolution", "200x150") == 0
-    picture = np.array(Pillow.open(tmp_path / "sky.png"))
-    assert picture.shape == (150 + 28, 200, 3)
-    legend = picture[150:159]
-    assert legend[0, 0].tolist() == [68, 1, 84] and legend[0, -1].tolist() == [253, 231, 37]
-    assert (picture[:150] != 255).any(axis=2).mean() > 0.2
 
 
 @cases(
@@ -122,6 +65,7 @@ def test_a_coloured_mesh_and_a_picture_with_a_legend(city: Path, tmp_path: Path)
         (["sky", "--distance", "-1", "-o", "a.npy"], "distance: expected"),
         (["sky", "--points", "none.npy", "-o", "a.npy"], "none.npy"),
         (["sky", "--camera", "s.toml", "-o", "a.npy"], "--camera: expected a .png"),
+        (["sun", "--suns", "suns.txt", "-o", "a.npy"], "weights: expected"),
         (["sky", "-o", "none/a.npy"], "none/a.npy"),
     ],
 )
@@ -130,10 +74,11 @@ def test_bad_arguments_are_told_on_one_line(
     arguments: list[str], said: str,
 ) -> None:  # fmt: skip
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "suns.txt").write_text("0 0 1 -1")
     assert _run(arguments[0], city, *arguments[1:]) == 2
     text = capsys.readouterr().err
     assert said in text and text.count("\n") == 1
-    assert not list(tmp_path.rglob("*.npy"))
+    assert [path.name for path in tmp_path.iterdir()] == ["suns.txt"]
 
 
 def test_files_that_are_no_points_or_suns_are_refused(
@@ -195,7 +140,159 @@ def test_a_run_that_is_killed_goes_on_and_ends_with_the_same_bits(tmp_path: Path
     assert np.load(result).tobytes() == expected.tobytes()
 
 
-def test_a_local_cluster_gives_the_same_bits(city: Path, tmp_path: Path) -> None:
-    assert _run("ao", city, "--samples", 64, "-o", tmp_path / "here.npy") == 0
-    assert _run("ao", city, "--samples", 64, "--cluster", "local", "--threads", 1, "-o", tmp_path / "there.npy") == 0
-    assert (tmp_path / "here.npy").read_bytes() == (tmp_path / "there.npy").read_bytes()
+def test_several_outputs_are_of_one_study(city: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    runs, asked = import_module("renderer.checkpoints.study"), []
+    own = runs.run
+    monkeypatch.setattr(runs, "run", lambda *told, **options: asked.append(told) or own(*told, **options))
+    np.save(tmp_path / "p.npy", load_mesh(city).vertices)
+    for where, names in (((), ("a.npy", "a.ply", "a.PNG")), (("--points", tmp_path / "p.npy"), ("b.npy", "b.ply"))):
+        study("sky", city, *where, *(word for name in names for word in ("-o", tmp_path / name)), "--quiet")
+    assert len(asked) == 2
+    assert {path.name for path in tmp_path.iterdir()} == {"a.npy", "a.ply", "a.PNG", "b.npy", "b.ply", "p.npy"}
+    for name, element in (("a", "face"), ("b", "vertex")):
+        values = PlyData.read(tmp_path / f"{name}.ply")[element]["value"]
+        np.testing.assert_array_equal(np.load(tmp_path / f"{name}.npy"), values)
+    with Pillow.open(tmp_path / "a.PNG") as picture:  # as large as unless told, and a legend
+        assert picture.width == 960 and 720 < picture.height < 800
+
+
+@pytest.mark.parametrize("told, threads", [((), available_threads()), (("--threads", 1), 1)])
+def test_threads_are_all_processors_unless_told(
+    city: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, told: tuple[object, ...], threads: int
+) -> None:
+    seen: list[int] = []
+    runs = import_module("renderer.checkpoints.study")
+    own = runs.run
+
+    def run(octree: Octree, *arguments: Any, **options: Any) -> Any:
+        seen.append(octree.threads)
+        return own(octree, *arguments, **options)
+
+    monkeypatch.setattr(runs, "run", run)
+    study("sky", city, "-o", tmp_path / "a.npy", *told, "--quiet")
+    assert seen == [threads]
+
+
+def test_a_study_says_what_it_wrote_unless_quiet(
+    city: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study("sky", city, "-o", tmp_path / "a.npy", "--quiet")
+    assert capsys.readouterr() == ("", "")
+    study("sky", city, "-o", tmp_path / "a.npy")
+    said = "".join(capsys.readouterr())
+    count = int(np.isfinite(np.load(tmp_path / "a.npy")).sum())
+    assert f"a.npy: sky view factor of {count:,} points in" in said
+
+
+def test_points_that_see_nothing_are_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Two within the cube, one above it."""
+    save_ply(box(), tmp_path / "cube.ply")
+    np.save(tmp_path / "p.npy", [[0.5, 0.5, 0.5], [0.25, 0.5, 0.75], [0.5, 0.5, 2.0]])
+    (tmp_path / "suns.txt").write_text("0 0 1\n")
+    told = [tmp_path / "cube.ply", "--points", tmp_path / "p.npy", "-o", tmp_path / "a.npy"]
+    for kind, counted in (("sky", True), ("ao", True), ("sun", False)):
+        study(kind, *told, *(("--suns", tmp_path / "suns.txt") if kind == "sun" else ()))
+        said = "".join(capsys.readouterr())
+        blind = "; 2 see nothing: they face down, are hidden all around or lie inside a body"
+        assert (blind in said) == counted and "of 3 points" in said
+        assert np.load(tmp_path / "a.npy").tolist() == [0, 0, 1]
+    np.save(tmp_path / "p.npy", [[0.5, 0.5, 2.0]])
+    study("sky", *told)
+    assert "see nothing" not in "".join(capsys.readouterr())
+
+
+@pytest.mark.parametrize(("kind", "option"), [("sky", "--points"), ("sun", "--suns")])
+def test_a_file_that_cannot_be_read_is_told_with_its_option(
+    city: Path, tmp_path: Path, kind: str, option: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for missing, why in ((tmp_path / "none", "No such file or directory"), (tmp_path, "Is a directory")):
+        assert main(["study", kind, str(city), option, str(missing), "-o", str(tmp_path / "a.npy"), "--quiet"]) == 2
+        said = f"octree-render: {option}: expected a file that can be read, got {missing}: {why}\n"
+        assert capsys.readouterr().err == said
+
+
+@cases(
+    "wrong",
+    [
+        ["-o", "{folder}"],
+        ["-o", "{folder}.png", "--resolution", "0x9"],
+        ["-o", "{folder}.png", "--resolution", "8193x9"],
+        ["-o", "{folder}.png", "--resolution", "9x8193"],
+        ["-o", "{folder}.ply", "-o", "{folder}/../s.npy.ply"],
+        ["-o", "{folder}/link.npy"],  # to the other output
+        ["--grid", "1e-300"],
+    ],
+)
+def test_options_that_are_refused_leave_no_parts(city: Path, tmp_path: Path, wrong: list[str]) -> None:
+    (tmp_path / "s.npy").mkdir()
+    (tmp_path / "s.npy" / "link.npy").symlink_to(tmp_path / "right.npy")
+    wrong = [word.format(folder=tmp_path / "s.npy") for word in wrong]
+    command = ["study", "ao", str(city), "-o", str(tmp_path / "right.npy"), "--quiet"]
+    assert main([*command, *wrong]) == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["s.npy"]
+    assert main(command) == 0
+
+
+@pytest.mark.parametrize("size", ["1x1", "8192x1"])
+def test_the_smallest_picture_and_the_widest(city: Path, tmp_path: Path, size: str) -> None:
+    output = tmp_path / "a.png"
+    assert main(["study", "sky", str(city), "-o", str(output), "--resolution", size, "--quiet"]) == 0
+    with Pillow.open(output) as picture:  # below it stands a legend
+        assert picture.width == int(size.partition("x")[0])
+
+
+@cases(
+    ("spacing", "got"), [(1e-300, "4e+300"), (1e300, "none"), (float(np.finfo(np.float64).max), "none"), (9.0, "none")]
+)
+def test_a_grid_over_a_wall_and_one_without_end(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], spacing: float, got: str
+) -> None:
+    """No ray from above meets a wall; of a fine grid it had rows without end, and a coarse one stood too far away."""
+    wall = Mesh([[0, 0, 0], [4, 0, 0], [4, 0, 2], [0, 0, 2]], [[0, 1, 2], [0, 2, 3]])
+    save_ply(wall, tmp_path / "wall.ply")
+    output = tmp_path / "a.npy"
+    command = ["study", "sky", str(tmp_path / "wall.ply"), "-o", str(output), "--quiet", "--grid", repr(spacing)]
+    assert main(command) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("octree-render: --grid: ") and said.endswith(f"got {got}\n") and len(said) < 120
+    assert not output.exists()
+
+
+@cases("read", ["mesh", "--points", "--suns", "--camera"])
+def test_no_output_is_a_file_that_is_read(tmp_path: Path, capsys: pytest.CaptureFixture[str], read: str) -> None:
+    """A table of suns and a scene were written over where a link led there."""
+    given = {name: tmp_path / f"{name.strip('-')}.ply" for name in ("mesh", "--points", "--suns", "--camera")}
+    for file in given.values():
+        file.write_text("whole")
+    (tmp_path / "link.png").symlink_to(given[read])
+    options = [str(word) for item in given.items() if item[0] != "mesh" for word in item]
+    if read != "--points":  # which go into no picture
+        del options[:2]
+    command = ["study", "sun", str(given["mesh"]), *options, "-o", str(tmp_path / "link.png")]
+    assert main(command) == 2
+    assert "--output: expected another file than those that are read" in capsys.readouterr().err
+    assert [file.read_text() for file in given.values()] == ["whole"] * 4
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes with names")
+def test_a_pipe_gets_the_whole_array(city: Path, tmp_path: Path) -> None:
+    """It got the header, and the message blamed the disk."""
+    study("ao", city, "-o", tmp_path / "file.npy", "--samples", 4, "--quiet")
+    os.mkfifo(tmp_path / "pipe.npy")
+    reader = os.open(tmp_path / "pipe.npy", os.O_RDONLY | os.O_NONBLOCK)
+    study("ao", city, "-o", tmp_path / "pipe.npy", "--samples", 4, "--quiet")
+    assert os.read(reader, 1 << 16) == (tmp_path / "file.npy").read_bytes()
+    os.close(reader)
+
+
+@pytest.mark.parametrize("option", ["-o", "--points", "mesh"])
+def test_a_link_to_itself_is_told_in_one_line(
+    city: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], option: str
+) -> None:
+    loop = tmp_path / "loop.npy"
+    loop.symlink_to(loop)
+    given = {"mesh": [str(loop)]}.get(option, [str(city), option, str(loop)])
+    output = [] if option == "-o" else ["-o", str(tmp_path / "a.npy")]
+    assert main(["study", "sky", *given, *output, "--quiet"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and said.startswith("octree-render: ") and str(loop) in said

@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +42,7 @@ def test_points_of_a_part_lie_together_and_answers_stay_in_the_callers_order(
 
 
 def test_points_that_are_put_in_order_in_turns_are_all_there(points: Points, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(import_module("renderer.checkpoints.study"), "_TOGETHER", 100)
+    monkeypatch.setattr("renderer.studies.points._TOGETHER", 100)
     order = points.order()
     for first in range(0, len(points), 100):
         assert sorted(order[first : first + 100]) == list(range(first, min(len(points), first + 100)))

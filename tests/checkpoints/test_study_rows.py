@@ -1,19 +1,14 @@
-"""The points that a study is made for and the values of its files, row by row, on meshes of a few faces."""
+"""The points that a study is made for and the values of its faces and vertices, on meshes of a few faces."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-import trimesh
 from cases import cases
 from numpy.typing import NDArray
 from twins import CORNERS, MESH, NORMALS, meetings
 
-from renderer import Mesh, Octree, Phong, Scene, SceneObject, render
-from renderer.diagnostics.false_color import VIRIDIS
-from renderer.diagnostics.mesh_values import draw, write_ply
-from renderer.scene.overview import from_above
+from renderer import Mesh, Octree
 from renderer.studies.points import of_file, on_faces, on_grid, on_vertices, suns_of
 
 Floats = NDArray[np.float64]
@@ -24,15 +19,6 @@ FEW = Mesh(
     [[0, 1, 2], [0, 1, 5], [0, 4, 2], [1, 2, 4]],
 )
 ANSWERS = np.array([3.0, 5.0, 11.0])  # of the faces that have an area
-
-
-def expected_colors(values: Floats) -> Floats:
-    """Viridis from the least value to the greatest, grey for none."""
-    low, high = np.nanmin(values), np.nanmax(values)
-    share = np.nan_to_num((values - low) / (high - low)) * (len(VIRIDIS) - 1)
-    colors = np.stack([np.interp(share, np.arange(len(VIRIDIS)), VIRIDIS[:, k]) for k in range(3)], axis=1)
-    colors[np.isnan(values)] = 128.0
-    return colors
 
 
 def test_points_and_values_of_faces() -> None:
@@ -81,6 +67,12 @@ def test_a_grid_stands_on_the_upper_side_of_a_sheet_that_is_turned_down() -> Non
     )
 
 
+def test_a_grids_points_at_the_meshs_edge_are_on_it() -> None:
+    corners = [[0, 0, 0], [1.5, 0, 0], [1.5, 1.5, 0], [0, 1.5, 0]]
+    found = on_grid(Octree(corners, [[0, 1, 2], [0, 2, 3]]), 1.0).points.points
+    assert sorted(map(tuple, found[:, :2].tolist())) == [(0.5, 0.5), (0.5, 1.5), (1.5, 0.5), (1.5, 1.5)]
+
+
 @cases("kind", ["<f8", ">f4", "<i2", "Fortran"])
 def test_points_of_a_file_are_read_in_their_rows(tmp_path: Path, kind: str) -> None:
     rows = np.array([[1, 2, 3, 0, 0, -2], [4, 5, 6, 1, 0, 0], [7, 8, 9, 0, 3, 4]])
@@ -103,41 +95,3 @@ def test_suns_are_read_in_their_rows_with_their_hours(tmp_path: Path, hours: boo
     suns, weights = suns_of(tmp_path / "suns.txt")
     np.testing.assert_array_equal(suns, [[1, 0, 2], [-3, 4, 5], [6, -7, 0.8]])
     np.testing.assert_array_equal(weights, [0.5, 1.5, 2.0] if hours else np.ones(3))
-
-
-@pytest.mark.parametrize("where", ["faces", "vertices", "cloud"])
-def test_a_ply_of_values_is_read_by_trimesh_with_each_rows_value_and_colour(tmp_path: Path, where: str) -> None:
-    """Values are doubles, NaN stays NaN and is grey."""
-    count = len(FEW.faces) if where == "faces" else len(FEW.vertices)
-    values = np.array([0.1, np.nan, 7.0, 2.0, 4.5, np.nan])[:count]
-    faces = None if where == "cloud" else FEW.faces
-    write_ply(tmp_path / "a.ply", FEW.vertices + 1e-9, faces, values, of_faces=where == "faces")
-    read: Any = trimesh.load(tmp_path / "a.ply", process=False)
-    np.testing.assert_array_equal(read.vertices, FEW.vertices + 1e-9)
-    raw = read.metadata["_ply_raw"]
-    assert ("face" in raw) == (where != "cloud")
-    if faces is not None:
-        np.testing.assert_array_equal(read.faces, faces)
-    colored = raw["face" if where == "faces" else "vertex"]["data"]
-    np.testing.assert_array_equal(colored["value"].ravel(), values)
-    colors = np.stack([colored[name].ravel() for name in ("red", "green", "blue")], axis=1)
-    # A step of the scale, which has 256, is at most 4 of 255 in a channel.
-    np.testing.assert_allclose(colors, expected_colors(values), atol=4)
-    assert "value" not in (raw["vertex"]["data"].dtype.names if where == "faces" else ())
-
-
-def test_a_picture_has_the_colour_of_each_faces_value() -> None:
-    """Floor and roof are as bright as their values' colours, and what has no value is grey."""
-    sheets = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
-    third = Mesh([[1.5, 0, 0], [3, 0, 0], [2.5, 1, 0]], [[0, 1, 2]])
-    mesh = Mesh.concatenate([sheets, third])
-    thing = SceneObject(mesh=mesh, material="grey")
-    scene = Scene(camera=from_above(mesh, (60, 40)), materials={"grey": Phong()}, objects=[thing])
-    image = render(scene, resolution=(120, 80), samples=1, max_depth=0)
-    values = np.array([2.0, 4.0, np.nan])
-    picture = draw(image, mesh, values, "title")[:40]
-    blocks = image.face.reshape(40, 2, 60, 2).transpose(0, 2, 1, 3).reshape(40, 60, 4)
-    for face, color in enumerate(expected_colors(values)):
-        whole = (blocks == face).all(axis=2)
-        assert whole.any() and (np.abs(picture[whole].astype(float) - color) <= 1.0).all()
-    assert (picture[(blocks < 0).all(axis=2)] == 255).all()

@@ -19,6 +19,11 @@ from renderer.mesh.load import save_ply
 from renderer.scene.camera import Camera
 from renderer.scene.overview import from_above
 
+pytestmark = pytest.mark.judges(
+    "octree-render study --camera", "octree-render study --grid", "octree-render study --points",
+    "octree-render study --resolution", "octree-render study --vertices",
+)  # fmt: skip
+
 GREY = [128, 128, 128]
 CAMERA = {"eye": [3.0, -4.0, 5.0], "target": [0.0, 0.0, 0.5], "up": [0.0, 0.0, 1.0], "fov": 50.0}
 
@@ -81,9 +86,10 @@ def test_trimesh_reads_values_and_colours_of_a_ply(
         assert np.array_equal(read.vertices, np.load(folder / "points.npy"))
 
 
-@cases("where", ["--faces", "--vertices"])
-@cases("camera", [None, "{}/scene.toml"])
-@cases("size", [(48, 36), (30, 40)])
+@cases(
+    ("where", "camera", "size"),
+    [("--faces", None, (48, 36)), ("--vertices", "{}/scene.toml", (30, 40)), ("--faces", "{}/scene.toml", (48, 36))],
+)
 def test_a_picture_has_the_values_colours_where_its_camera_sees_them(
     folder: Path, tmp_path: Path, where: str, camera: str | None, size: tuple[int, int]
 ) -> None:

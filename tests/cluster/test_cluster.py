@@ -1,11 +1,6 @@
 """Studies and rays on a cluster have the bits of those on this machine, whatever workers die."""
 
-import doctest
-import os
-import signal
 import sys
-import threading
-import time
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -14,9 +9,8 @@ import dask.array as da
 import numpy as np
 import pytest
 from cases import cases
-from watched import Watched
 
-from renderer import Mesh, Octree, cluster
+from renderer import Mesh, Octree
 from renderer.checkpoints.study import Study, run
 from renderer.cluster import any_hit, closest_hit, connected, run_on
 from renderer.studies.points import on_faces
@@ -43,45 +37,6 @@ def test_a_study_on_workers_has_the_bits_of_one_process(client: Any, octree: Oct
     assert there.plan.parts > 10 and there.joined().tobytes() == expected.tobytes()
     other = run_on(client, octree, study, points, tmp_path / "other", size=SIZE * 4, split="sah")
     assert 1 < other.plan.parts < there.plan.parts and other.joined().tobytes() == expected.tobytes()
-
-
-def test_a_worker_that_is_killed_changes_no_bit(octree: Octree, tmp_path: Path) -> None:
-    """A real process, killed as soon as parts come in."""
-    points, study = on_faces(octree).points, Study("sky", {"patches": 2305})
-    folder, killed = tmp_path / "parts", list[int]()
-    with connected(workers=2) as client:
-        pids = sorted(client.run(os.getpid).values())
-
-        def kill() -> None:
-            while len(list(folder.glob("*.part"))) < 2:
-                time.sleep(0.005)
-            os.kill(pids[0], signal.SIGKILL)
-            killed.append(pids[0])
-
-        killer = threading.Thread(target=kill, daemon=True)
-        killer.start()
-        parts = run_on(client, octree, study, points, folder, size=SIZE)
-        killer.join(timeout=60)
-    assert killed == pids[:1]
-    assert parts.joined().tobytes() == study.evaluate(octree, points).tobytes()
-
-
-def test_parts_of_a_scheduler_that_is_gone_are_not_computed_again(octree: Octree, tmp_path: Path) -> None:
-    """A run that ends with its scheduler goes on from the manifest on another one."""
-    points, study, folder = on_faces(octree).points, Study("sky", {}), tmp_path / "parts"
-
-    def stop(name: str) -> None:
-        if name == "submit" and len(list(folder.glob("*.part"))) >= 3:
-            raise KeyboardInterrupt
-
-    with connected(workers=1) as client, pytest.raises(KeyboardInterrupt):
-        run_on(Watched(client, stop), octree, study, points, folder, size=SIZE)
-    kept = {path: path.stat().st_mtime_ns for path in folder.glob("*.part")}
-    assert len(kept) >= 3
-    with connected(workers=1) as client:
-        parts = run_on(client, octree, study, points, folder, size=SIZE)
-    assert {path: path.stat().st_mtime_ns for path in kept} == kept
-    assert parts.joined().tobytes() == study.evaluate(octree, points).tobytes()
 
 
 def test_hits_of_dask_arrays_stay_lazy_and_keep_chunks(client: Any, octree: Octree) -> None:
@@ -174,12 +129,3 @@ def test_bad_arguments_of_a_study_are_named(
     good = {"client": client, "octree": octree, "study": Study("sky", {}), "points": on_faces(octree).points}
     with pytest.raises(ValueError, match=said):
         run_on(**(good | {"folder": tmp_path / "parts"} | bad))
-
-
-def test_the_examples_of_the_docstrings_hold() -> None:
-    runner = doctest.DocTestRunner()
-    for name in cluster.__all__:
-        thing = getattr(cluster, name)
-        for example in doctest.DocTestFinder().find(thing, name, globs=dict(vars(sys.modules[thing.__module__]))):
-            runner.run(example)
-    assert runner.tries > 15 and runner.failures == 0

@@ -19,11 +19,8 @@ pytestmark = pytest.mark.judges("cluster.connected", "cluster.render_on", "octre
 PICTURE = ["render", "scenes/glass.toml", "--resolution", "48x40", "--samples", "4"]
 
 
-@pytest.mark.parametrize("name", ["a.png", "a.exr"])
-def test_a_picture_of_a_cluster_is_the_file_of_this_machine(
-    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    here, there = tmp_path / "here" / name, tmp_path / "there" / name
+def test_a_picture_of_a_cluster_is_the_file_of_this_machine(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    here, there = tmp_path / "here" / "a.exr", tmp_path / "there" / "a.exr"
     for path in (here, there):
         path.parent.mkdir()
     asked = [*PICTURE, "--split", "sah", "--max-depth", "3", "--max-rays", "9"]
@@ -33,22 +30,19 @@ def test_a_picture_of_a_cluster_is_the_file_of_this_machine(
     told = capsys.readouterr()
     assert "pixels miss rays" in told.err and told.out.startswith("dashboard: http://127.0.0.1:")
     assert f"{there}: 48 x 40, " in told.out and told.out.rstrip().endswith("on the cluster")
-    assert here.read_bytes() == there.read_bytes() and [p.name for p in there.parent.iterdir()] == [name]
+    assert here.read_bytes() == there.read_bytes() and [p.name for p in there.parent.iterdir()] == ["a.exr"]
 
 
-def test_a_quiet_command_says_nothing_of_its_cluster(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_study_of_a_cluster_has_the_bytes_of_this_machine_and_says_nothing_where_it_is_quiet(
+    client: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of one of its own, and of one at an address."""
     save_ply(named("city_300"), tmp_path / "city.ply")
-    study = ["study", "sky", str(tmp_path / "city.ply"), "-o", str(tmp_path / "a.npy")]
-    assert main([*study, "--cluster", "local", "--threads", "1", "--quiet"]) == 0
-    assert capsys.readouterr() == ("", "")
-
-
-def test_a_study_at_an_address_has_the_bytes_of_this_machine(client: Any, tmp_path: Path) -> None:
-    save_ply(named("city_300"), tmp_path / "city.ply")
-    study = ["study", "sky", str(tmp_path / "city.ply"), "--quiet", "-o"]
-    assert main([*study, str(tmp_path / "here.npy")]) == 0
-    assert main([*study, str(tmp_path / "there.npy"), "--cluster", client.scheduler.address]) == 0
-    assert (tmp_path / "here.npy").read_bytes() == (tmp_path / "there.npy").read_bytes()
+    study, files = ["study", "sky", str(tmp_path / "city.ply"), "--quiet", "-o"], []
+    for where in ([], ["--cluster", "local", "--threads", "1"], ["--cluster", client.scheduler.address]):
+        assert main([*study, str(tmp_path / "a.npy"), *where]) == 0
+        files.append((tmp_path / "a.npy").read_bytes())
+    assert files.count(files[0]) == 3 and capsys.readouterr() == ("", "")
 
 
 @cases(
@@ -70,20 +64,13 @@ def test_what_is_wrong_is_told_on_one_line(
     assert said in told and told.count("\n") == 1 and not list(tmp_path.iterdir())
 
 
-def test_parts_of_another_picture_are_refused_and_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = tmp_path / "a.npy.parts"
-    folder.mkdir()
-    (folder / "manifest.json").write_text('{"rows": 40, "made_of": {"kind": "picture", "scene": "0"}}')
-    assert main([*PICTURE, "-o", str(tmp_path / "a.npy"), "--cluster", "--threads", "1", "--quiet"]) == 2
-    told = capsys.readouterr().err
-    assert "a.npy.parts: expected the parts of this run, got those of another" in told and told.count("\n") == 1
-    assert [path.name for path in folder.iterdir()] == ["manifest.json"]
-
-
-def test_a_picture_without_a_cluster_imports_no_dask(tmp_path: Path) -> None:
+def test_without_a_cluster_no_dask_is_imported(tmp_path: Path) -> None:
+    save_ply(named("city_300"), tmp_path / "city.ply")
+    output = ["-o", str(tmp_path / "a.npy"), "--quiet"]
+    commands = [[*PICTURE, *output], ["study", "sky", str(tmp_path / "city.ply"), *output]]
     program = (
         "import sys\nfrom renderer.cli.main import main\n"
-        f"code = main({[*PICTURE, '-o', str(tmp_path / 'a.npy'), '--quiet']!r})\n"
-        "sys.exit(code or ('dask' in sys.modules or 'distributed' in sys.modules) * 9)"
+        f"codes = [main(command) for command in {commands!r}]\n"
+        "sys.exit(any(codes) or ('dask' in sys.modules or 'distributed' in sys.modules) * 9)"
     )
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0

@@ -4,7 +4,7 @@ An option that is added without a case here, or in the file named beside it, fai
 """
 
 import argparse
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from importlib import import_module
 from pathlib import Path
@@ -16,6 +16,7 @@ import tomlkit
 from cases import cases
 from PIL import Image as Pillow
 from varied import BASE, Table, picture, scene_of, write_meshes
+from watched import results_here
 
 from renderer import Octree, load_scene, srgb
 from renderer.cli.cluster import on_cluster
@@ -76,12 +77,8 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
     def told(of: Callable[..., Any]) -> Callable[..., Any]:
         return lambda *scene, **options: asked.append(options) or of(*scene, **options)
 
-    def results(_client: object, function: Callable[..., Any], tasks: Iterable[Any]) -> Iterator[tuple[Any, Any]]:
-        for task in tasks:
-            yield task.name, function(task.shared, *task.arguments)
-
     pictures = import_module("renderer.cluster.pictures")
-    monkeypatch.setattr(pictures, "results", results)
+    monkeypatch.setattr(pictures, "results", results_here)
     monkeypatch.setattr("renderer.cluster.render_on", told(pictures.render_on))
     monkeypatch.setattr("renderer.cli.cluster.on_cluster", lambda options: nullcontext())
     module = import_module("renderer.picture.render")
@@ -166,8 +163,9 @@ def test_what_is_said_of_cut_pixels_names_the_rays_that_held(
     assert capsys.readouterr().err.startswith(said)
 
 
-@pytest.mark.parametrize("where", [[], ["--cluster"]], ids=["here", "cluster"])
-@pytest.mark.parametrize(("png", "npy", "exr"), [("png", "npy", "exr"), ("PNG", "NPY", "EXR")])
+@pytest.mark.parametrize(
+    ("where", "png", "npy", "exr"), [([], "PNG", "NPY", "EXR"), (["--cluster"], "png", "npy", "exr")]
+)
 def test_each_format_is_read_by_others_as_the_picture(
     folder: Path, tmp_path: Path, asked: list[dict[str, Any]], where: list[str], png: str, npy: str, exr: str
 ) -> None:

@@ -6,7 +6,6 @@ files       mutated mesh and scene files (ascii.ply ... scene.toml), files.py
 camera, light, transform, settings    scenes at the ends of numbers, scenes.py
 query       rays at the ends of numbers, of odd shapes and types, rays.py
 output      files that cannot be written, faults.py
-cache       damaged folders of compiled kernels, each in a process of its own, faults.py
 
 The long run, with its findings kept as files, and one input of it again:
 

@@ -1,7 +1,4 @@
-"""Faults around the program: damaged folders of compiled kernels, and files that cannot be written.
-
-A damaged kernel costs time only. A file is there whole, or nothing is changed and the error names the path.
-"""
+"""Files that cannot be written: each is there whole, or nothing is changed and the error names the path."""
 
 import builtins
 import errno
@@ -19,7 +16,6 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from kernel_package import start, write_package
 
 from fuzz.values import Kind
 from renderer import Image, load_mesh, load_scene
@@ -39,8 +35,6 @@ def _tree(folder: Path) -> dict[str, Any]:
         for p in sorted(folder.rglob("*"))
     }
 
-
-# --- files that cannot be written ------------------------------------------------------------------------------
 
 PLACES = [
     *("plain", "plain", "old", "old", "missing folder", "a folder", "link to a file", "dangling link"),
@@ -237,90 +231,7 @@ def _check_write(base: Path, path: Path, mesh_file: Path, given: Values) -> str:
     return "written"
 
 
-# --- damaged kernels -------------------------------------------------------------------------------------------
-
-DAMAGES = [
-    *("nothing", "empty", "truncated", "a bit", "a bit", "a folder", "dangling", "loop", "unreadable", "gone"),
-    *("longer", "no folder", "a file as folder", "a dangling folder", "a folder unreadable", "zeros"),
-]  # fmt: skip
-# A process of its own: it imports Numba and may compile.
-PROCESS_SECONDS = 60.0
-
-
-def make_cache(seed: int, index: int) -> Values:
-    rng = Random(f"cache {seed} {index}")
-    return {"damage": rng.choice(DAMAGES), "where": rng.random(), "bit": rng.randrange(8)}
-
-
-def _damage_file(path: Path, given: Values) -> None:
-    content = path.read_bytes()
-    at, bit = int(given["where"] * len(content)), 1 << given["bit"]
-    contents = {
-        "empty": b"", "truncated": content[:at], "longer": content + content[:at], "zeros": bytes(len(content)),
-        "a bit": content[:at] + bytes([content[at] ^ bit]) + content[at + 1 :],
-    }  # fmt: skip
-    damage = given["damage"]
-    if damage in contents:
-        path.write_bytes(contents[damage])
-    elif damage == "unreadable":
-        path.chmod(0)
-    elif damage != "nothing":
-        path.unlink()
-        if damage == "a folder":
-            path.mkdir()
-        elif damage in ("dangling", "loop"):
-            path.symlink_to(path.name if damage == "loop" else "nowhere")
-
-
-def _damage(kernels: Path, given: Values) -> None:
-    """Damage the one kernel in the one folder in ``kernels``, or that folder."""
-    (folder,) = kernels.iterdir()
-    damage = given["damage"]
-    if "folder" not in damage or damage == "a folder":
-        (path,) = folder.glob("*.kernel")
-        _damage_file(path, given)
-    elif damage == "a folder unreadable":
-        folder.chmod(0)
-    else:
-        shutil.rmtree(folder)
-        if damage == "a file as folder":
-            folder.write_bytes(b"")
-        elif damage == "a dangling folder":
-            folder.symlink_to("nowhere/at/all")
-
-
-def kept_package(folder: Path) -> tuple[Path, Path]:
-    """The small package of tests/kernel_package.py, and the folder of its kernels as they were compiled."""
-    parent, kernels = folder / "small", folder / "kernels"
-    if not parent.exists():
-        write_package(parent)
-        start(parent / "renderer", NUMBA_CACHE_DIR=str(kernels))
-    return parent / "renderer", kernels
-
-
-def check_cache(folder: Path, given: Values, index: int) -> str:
-    package, sound = kept_package(folder)
-    kernels = Path(tempfile.mkdtemp(dir=folder))
-    try:
-        shutil.copytree(sound, kernels, dirs_exist_ok=True)
-        _damage(kernels, given)
-        # ``start`` expects exit code 0.
-        done = start(package, NUMBA_CACHE_DIR=str(kernels), XDG_CACHE_HOME=str(kernels / "user"))
-    finally:
-        shutil.rmtree(kernels)
-        for left in (package / "__pycache__").glob("*.kernel"):
-            left.unlink()
-    answer, loaded, compiled = done.stdout.split()
-    assert answer == "17", f"a wrong answer: {answer}"
-    assert int(loaded) + int(compiled) == 1 and "Traceback" not in done.stderr, done.stderr
-    assert (loaded == "1") == (given["damage"] == "nothing") or given["damage"].endswith("unreadable"), "not noticed"
-    return "loaded" if loaded == "1" else "compiled"
-
-
-KINDS = {
-    "output": Kind(make_output, check_output, share=4),
-    "cache": Kind(make_cache, check_cache, share=0, seconds=PROCESS_SECONDS),
-}
+KINDS = {"output": Kind(make_output, check_output)}
 
 
 def prepare_kinds() -> None:

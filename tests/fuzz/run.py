@@ -16,8 +16,6 @@ from renderer.mesh.ply import format_ply
 from renderer.mesh.shapes import box
 
 KINDS: dict[str, Kind] = {**files.KINDS, **scenes.KINDS, **rays.KINDS, **faults.KINDS}
-# A kind whose share is 0 comes once in so many inputs, so often at most.
-RARE, MOST_RARE = 3500, 30
 
 
 def prepare(folder: Path) -> None:
@@ -26,22 +24,6 @@ def prepare(folder: Path) -> None:
     for kinds in (scenes, rays, faults):
         kinds.prepare_kinds()
     (folder / "box.ply").write_bytes(format_ply(box()))
-
-
-class Turns:
-    """Which kind has which number."""
-
-    def __init__(self, kinds: list[str]) -> None:
-        self._rare = [name for name in kinds if KINDS[name].share == 0]
-        self._turn = [name for name in kinds for _ in range(KINDS[name].share)]
-
-    def __getitem__(self, index: int) -> str:
-        turn, place = divmod(index, RARE)
-        if not self._turn:
-            return self._rare[index % len(self._rare)]
-        if self._rare and place == RARE - 1 and turn < MOST_RARE:
-            return self._rare[turn % len(self._rare)]
-        return self._turn[index % len(self._turn)]
 
 
 class Log:
@@ -91,15 +73,14 @@ def judge(name: str, folder: Path, seed: int, index: int, log: Log) -> None:
     kind = KINDS[name]
     given = kind.make(seed, index)
     # The alarm waits for a kernel's end; this one does not.
-    faulthandler.dump_traceback_later(20 * max(SECONDS, kind.seconds), exit=True)
+    faulthandler.dump_traceback_later(20 * SECONDS, exit=True)
     start = time.perf_counter()
     try:
         log.count(name, kind.judge(folder, given, index))
     except Exception as error:
         log.find(name, index, given, error)
     seconds = time.perf_counter() - start
-    if kind.share:
-        log.slowest = max(log.slowest, (seconds, f"input {index} of {name}"))
+    log.slowest = max(log.slowest, (seconds, f"input {index} of {name}"))
 
 
 def _arguments() -> argparse.Namespace:
@@ -117,13 +98,14 @@ def _arguments() -> argparse.Namespace:
 
 def main() -> int:
     given = _arguments()
-    turns, log = Turns(given.kinds), Log(given.keep)
+    turns = [name for name in given.kinds for _ in range(KINDS[name].share)]
+    log = Log(given.keep)
     with tempfile.TemporaryDirectory() as name_of_folder:
         folder = Path(name_of_folder)
         prepare(folder)
         began, done = time.perf_counter(), 0
         for index in range(given.first, given.first + given.inputs):
-            judge(turns[index], folder, given.seed, index, log)
+            judge(turns[index % len(turns)], folder, given.seed, index, log)
             done += 1
             if time.perf_counter() - began > given.seconds:
                 break

@@ -31,11 +31,10 @@ class Kind:
     make: Callable[[int, int], Any]
     check: Callable[[Path, Any, int], str]
     share: int = 4
-    seconds: float = SECONDS
 
     def judge(self, folder: Path, given: Any, index: int) -> str:
         """``check`` within the limit of time, with warnings as errors."""
-        with time_limit(self.seconds), warnings.catch_warnings():
+        with time_limit(SECONDS), warnings.catch_warnings():
             warnings.simplefilter("error")
             return self.check(folder, given, index)
 

@@ -7,12 +7,11 @@ import sys
 from pathlib import Path
 
 import numba
-import numpy as np
 import pytest
 
 from renderer import Octree
 from renderer.jit import compiler
-from renderer.jit.notice import Stopwatch, compile_seconds
+from renderer.jit.notice import compile_seconds
 from renderer.mesh.shapes import icosphere
 
 ROOT = Path(__file__).parents[2]
@@ -83,26 +82,6 @@ def test_what_python_does_not_call_is_not_compiled_for_it():
     assert below(1) == 2 and below.__name__ == "below"
 
 
-def test_plain_kernels_of_numba_may_call_ours():
-    @kernel
-    def low(x):
-        return x + 1.0
-
-    @kernel
-    def high(x):
-        return low(x) * 2.0
-
-    @numba.njit
-    def theirs(values):
-        total = np.zeros(1)
-        for value in values:
-            total[0] += high(value)
-        return total[0]
-
-    assert theirs(np.array([1.0, 2.0])) == 10.0
-    assert high(1.0) == 4.0
-
-
 def test_a_kernel_that_cannot_be_compiled_says_so_each_time():
     @kernel
     def wrong(x):
@@ -125,22 +104,6 @@ def test_compiling_leaves_the_garbage_collector_as_it_was():
     finally:
         gc.enable()
     assert once(1.0) == 42.0 and gc.isenabled()
-
-
-def test_a_stopwatch_does_not_count_compiling():
-    @kernel
-    def timed(x):
-        return x * x
-
-    clock, before = Stopwatch(), compile_seconds()
-    timed(3)
-    compiled = compile_seconds() - before
-    assert compiled > 0.0
-    again = compile_seconds()
-    timed(4)
-    assert compile_seconds() == again
-    # What is left is the call, less than a wall clock would say by what was compiled.
-    assert 0.0 <= clock.seconds() < compiled + 10.0
 
 
 def test_the_probe_finds_a_numba_that_fits_and_one_that_does_not(monkeypatch):
@@ -180,12 +143,6 @@ def test_kernels_work_without_our_compiler_where_numba_has_changed(tmp_path, cha
     (line,) = done.stderr.splitlines()
     assert line.startswith("renderer: Numba 0.99.0 is not one of those that this version was made for (0.68.*): ")
     assert not list(tmp_path.rglob("*.kernel"))
-
-
-def test_only_the_first_of_several_kernels_is_told_of():
-    script = "from renderer.jit.notice import compiling\nfor name in 'ab':\n    with compiling(name, None): pass\n"
-    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert done.stderr.count("compiling kernels") == 1 == len(done.stderr.splitlines())
 
 
 def test_another_numba_that_fits_is_used_without_a_word_and_keeps_its_kernels(tmp_path):

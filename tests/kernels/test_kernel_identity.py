@@ -91,15 +91,6 @@ def test_kernels_of_no_file_are_not_kept(package):
     assert not list(package.parent.rglob("*.kernel"))
 
 
-def test_an_edit_elsewhere_in_the_file_keeps_a_kernel_and_removes_none_of_its_name(package):
-    text = "@kernel\ndef moved(x): return x + 1\nprint(moved(1), sum(moved.entry.stats.cache_hits.values()))\n"
-    assert mine(package, text) == ["2", "0"]
-    assert mine(package, text) == ["2", "1"]
-    # The text of a file from elsewhere counts whole.
-    assert mine(package, text + "# edited\n") == ["2", "0"]
-    assert len(list(package.parent.glob("__pycache__/mine.*.kernel"))) == 1
-
-
 @pytest.mark.parametrize("folder", ["locked/cache", "n" * 300])
 @pytest.mark.parametrize("variable", ["HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR", "OCTREE_RENDERER_KERNELS"])
 def test_a_folder_that_may_not_be_looked_at_counts_as_absent(package, tmp_path, variable, folder):

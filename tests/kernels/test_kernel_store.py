@@ -9,7 +9,7 @@ from pathlib import Path
 import llvmlite.binding as llvm
 import pytest
 from cases import cases
-from kernel_package import COMPILED, LOADED, MIDDLE, RUN, UPPER, bottom_of, copy_package, run, start, write_package
+from kernel_package import COMPILED, LOADED, MIDDLE, RUN, UPPER, bottom_of, run, start, write_package
 
 from renderer.jit.cache import _user_cache, _versions, runnable_levels
 from renderer.jit.levels import FEATURES, LEVELS, lacking
@@ -48,23 +48,6 @@ def test_an_edit_below_a_kernel_shows_and_an_edit_beside_it_keeps_the_cache(pack
     (package / "upper.py").write_text(UPPER.replace("+ 1", "+ 2"))
     assert run(package) == ["37", "0", "1"]
     assert run(package) == ["37", "1", "0"]
-
-
-def test_an_edit_of_the_real_triangle_test_shows(tmp_path):
-    # The whole package, where the kernel that runs is two modules above the one edited; what is compiled comes along.
-    folder = copy_package(tmp_path)
-    script = """
-from renderer.octree import BruteForce
-brute = BruteForce([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], threads=1)
-print(brute.any_hit([[0.25, 0.25, 1]], [[0, 0, -1]])[0])
-"""
-    assert run(folder, script) == ["True"]
-    path = folder / "trace" / "intersect.py"
-    source = path.read_text(encoding="utf-8")
-    edited = source.replace("(least >= zero) | (most <= zero)", "(least >= zero) & (most <= zero)")
-    assert edited != source
-    path.write_text(edited)
-    assert run(folder, script) == ["False"]
 
 
 @pytest.mark.parametrize("pretend", ["import llvmlite\nllvmlite.__version__ = '99.0'\n", "import numba\n"
@@ -192,13 +175,6 @@ assert doubled(3) == 16
     assert len(said) == 1 and said[0].endswith("No space left on device") and "__pycache__" in said[0]
 
 
-def test_what_is_compiled_is_logged_and_what_is_loaded_is_not(package):
-    kept = f"(once, kept in {package / '__pycache__'})"
-    first = f"renderer: compiling kernels, which takes some seconds {kept} compiling answer {kept} 17 0 1"
-    assert " ".join(run(package, TELL + RUN)) == first
-    assert run(package, TELL + RUN) == LOADED
-
-
 @pytest.mark.parametrize(
     ("how", "told"),
     [
@@ -294,12 +270,6 @@ class TestAhead:
     def test_they_are_not_used_by_a_machine_that_lacks_the_level(self, package, folder):
         pretend = "import renderer.jit.cache as store\nstore.runnable_levels = tuple\n"
         assert run(package, pretend + RUN, OCTREE_RENDERER_KERNELS=str(folder)) == COMPILED
-
-    def test_they_are_never_written(self, package, folder):
-        before = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
-        bottom_of(package).write_text("STEP = 20\n")
-        assert run(package, OCTREE_RENDERER_KERNELS=str(folder)) == ["27", "0", "1"]
-        assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes with names")

@@ -10,7 +10,6 @@ from renderer.numerics.simd import (
     bits_float,
     double_of,
     every8,
-    extract,
     farthest_first,
     float32_pointer,
     float64_pointer,
@@ -34,43 +33,34 @@ from renderer.numerics.simd import (
     splat8,
     square_root,
     store,
-    unlikely,
     widen,
 )
 
 F32 = [0.0, -0.0, 1.0, -1.5, np.inf, -np.inf, np.nan, 1e-45, 3.4e38, 0.1, 0.3, 7.0]
 
 
-@njit
-def operations8(a, b, c, out, masks):
-    x, y, s = load8(a, 3), load8(b, 1), splat8(c)
-    store(out, 0, x + y)
-    store(out, 8, x - y)
-    store(out, 16, x * y)
-    store(out, 24, x / y)
-    store(out, 32, select(x < y, x, y))
-    store(out, 40, s)
-    store(out, 48, x * y - s)
-    store(out, 56, select((x > y) | (x < s), s, x))
-    masks[0], masks[1], masks[2], masks[3] = movemask(x < y), movemask(x <= y), movemask(x > y), movemask(x >= y)
-    masks[4], masks[7] = movemask(x != y), movemask(x == y)
-    masks[5], masks[6] = movemask((x < y) & (x < s)), movemask((x < y) | (x < s))
+def operations_of(load, splat, lanes):
+    """Each operation on a number of lanes, one result behind the other."""
+
+    @njit
+    def operations(a, b, c, out, masks):
+        x, y, s = load(a, 3), load(b, 1), splat(c)
+        store(out, 0, x + y)
+        store(out, lanes, x - y)
+        store(out, 2 * lanes, x * y)
+        store(out, 3 * lanes, x / y)
+        store(out, 4 * lanes, select(x < y, x, y))
+        store(out, 5 * lanes, s)
+        store(out, 6 * lanes, x * y - s)
+        store(out, 7 * lanes, select((x > y) | (x < s), s, x))
+        masks[0], masks[1], masks[2], masks[3] = movemask(x < y), movemask(x <= y), movemask(x > y), movemask(x >= y)
+        masks[4], masks[7] = movemask(x != y), movemask(x == y)
+        masks[5], masks[6] = movemask((x < y) & (x < s)), movemask((x < y) | (x < s))
+
+    return operations
 
 
-@njit
-def operations4(a, b, c, out, masks):
-    x, y, s = load4(a, 3), load4(b, 1), splat4(c)
-    store(out, 0, x + y)
-    store(out, 4, x - y)
-    store(out, 8, x * y)
-    store(out, 12, x / y)
-    store(out, 16, select(x < y, x, y))
-    store(out, 20, s)
-    store(out, 24, x * y - s)
-    store(out, 28, select((x > y) | (x < s), s, x))
-    masks[0], masks[1], masks[2], masks[3] = movemask(x < y), movemask(x <= y), movemask(x > y), movemask(x >= y)
-    masks[4], masks[7] = movemask(x != y), movemask(x == y)
-    masks[5], masks[6] = movemask((x < y) & (x < s)), movemask((x < y) | (x < s))
+OPERATIONS = {8: operations_of(load8, splat8, 8), 4: operations_of(load4, splat4, 4)}
 
 
 def bits_of(mask):
@@ -86,7 +76,7 @@ def test_operations_equal_numpy(lanes, stored, seed):
     # Everything outside the lanes stays as it is.
     out, masks = np.full(8 * lanes + 3, 77, kind), np.zeros(8, np.int64)
     c = kind(rng.normal())
-    (operations8 if lanes == 8 else operations4)(a, b, c, out, masks)
+    OPERATIONS[lanes](a, b, c, out, masks)
     x, y, s = a[3 : 3 + lanes].astype(kind), b[1 : 1 + lanes].astype(kind), np.full(lanes, c)
     with np.errstate(all="ignore"):
         expected = [
@@ -105,11 +95,11 @@ def test_operations_equal_numpy(lanes, stored, seed):
 
 def test_products_and_differences_are_not_fused():
     # (1 + u)(1 - u) rounds to 1; a fused multiply-add would leave -u^2.
-    for lanes, kind, operation in ((8, np.float32, operations8), (4, np.float64, operations4)):
+    for lanes, kind in ((8, np.float32), (4, np.float64)):
         u = np.finfo(kind).eps
         a, b = np.full(16, 1 + u, kind), np.full(16, 1 - u, kind)
         out, masks = np.empty(8 * lanes, kind), np.zeros(8, np.int64)
-        operation(a, b, kind(1), out, masks)
+        OPERATIONS[lanes](a, b, kind(1), out, masks)
         assert (out[6 * lanes : 7 * lanes] == 0).all()
 
 
@@ -130,22 +120,6 @@ def test_square_roots_are_rounded_as_numpy_rounds_them():
 
 
 @njit
-def lanes_of(a8, a4, out8, out4):
-    for i in range(8):
-        out8[i] = extract(load8(a8, 0), i)
-    for i in range(4):
-        out4[i] = extract(load4(a4, 0), i)
-
-
-def test_lanes_may_be_chosen_at_run_time():
-    a8, a4 = np.arange(8, dtype=np.float32) + 0.5, np.arange(4) / 3
-    out8, out4 = np.zeros(8, np.float32), np.zeros(4)
-    lanes_of(a8, a4, out8, out4)
-    np.testing.assert_array_equal(out8, a8)
-    np.testing.assert_array_equal(out4, a4)
-
-
-@njit
 def bit_operations(value, bits):
     return float_bits(value), bits_float(bits), lowest_bit(bits)
 
@@ -162,15 +136,6 @@ def test_bits():
     for k in range(63):
         assert bit_operations(np.float32(0), 1 << k)[2] == k
         assert bit_operations(np.float32(0), (1 << k) | (1 << 62))[2] == k
-
-
-@njit
-def _said(a, b):
-    return unlikely(a > b)
-
-
-def test_what_is_unlikely_may_still_be_true():
-    assert _said(2.0, 1.0) is True and _said(1.0, 2.0) is False and _said(np.nan, 2.0) is False
 
 
 @njit

@@ -123,3 +123,16 @@ def test_a_node_below_two_others_is_refused(tmp_path):
     nodes = [{"children": [1, 2]}, {"children": [3]}, {"children": [3]}, {"mesh": 0}]
     with pytest.raises(MeshError, match="each node below at most one other"):
         load_mesh(glb(tmp_path, {"nodes": nodes}))
+
+
+@cases(
+    ("document", "message"),
+    [
+        ({"meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 6}]}]}, "got a TRIANGLE_FAN in mesh 0"),
+        ({"accessors": [{"componentType": 5126, "count": 3, "type": "VEC3", "sparse": {"count": 1}}]},
+         "expected plain accessors, got a sparse one, accessor 0"),
+    ],
+)  # fmt: skip
+def test_what_would_be_read_wrongly_is_refused_by_name(tmp_path, document, message):
+    with pytest.raises(MeshError, match=f"GLB: .*{message}"):
+        load_mesh(glb(tmp_path, document))

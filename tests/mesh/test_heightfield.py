@@ -1,12 +1,16 @@
-"""Height fields: where vertices lie, which way faces look, and holes."""
+"""Height fields against a slow twin, cell by cell, with holes anywhere; what is refused."""
 
 import doctest
+from typing import Any
 
 import numpy as np
 import pytest
+from array_forms import FORMS
 from cases import cases
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from renderer import MeshError, Octree
+from renderer import MeshError
 from renderer.mesh import heightfield
 from renderer.mesh.heightfield import heightfield_mesh
 
@@ -14,26 +18,6 @@ from renderer.mesh.heightfield import heightfield_mesh
 def test_the_example_holds():
     results = doctest.testmod(heightfield)
     assert results.failed == 0 and results.attempted > 0
-
-
-def test_vertices_are_the_grids_and_faces_look_up():
-    heights = np.random.default_rng(1).random((4, 6))
-    mesh = heightfield_mesh(heights, (2.0, 3.0), (100.0, -50.0, 7.0))
-    expected = [[100.0 + 2.0 * j, -50.0 + 3.0 * i, heights[i, j] + 7.0] for i in range(4) for j in range(6)]
-    np.testing.assert_array_equal(mesh.vertices, expected)
-    assert len(mesh.faces) == 2 * 3 * 5 and (mesh.face_normals()[:, 2] > 0.0).all()
-    down = Octree.from_mesh(mesh).closest_hit(np.add(expected, [0.0, 0.0, 9.0]), [0.0, 0.0, -1.0])
-    np.testing.assert_allclose(down.t, 9.0, atol=1e-12)
-
-
-def test_nothing_is_built_around_unknown_heights():
-    heights = np.arange(20.0).reshape(4, 5)
-    heights[1, 1] = np.nan
-    mesh = heightfield_mesh(heights)
-    # Of the four cells around it the diagonal ones keep no face where both have the corner, the others one.
-    assert len(mesh.faces) == 24 - 6 and 6 not in mesh.faces
-    assert mesh.bounds[0].tolist() == [0, 0, 0] and mesh.bounds[1].tolist() == [4, 3, 19]
-    assert len(heightfield_mesh(np.full((3, 3), np.nan)).faces) == 0
 
 
 @cases(
@@ -59,3 +43,41 @@ def test_bad_arguments_are_named(argument, value, said):
 def test_heights_beyond_float64_are_refused():
     with pytest.raises(MeshError, match="finite"):
         heightfield_mesh([[1e308, 0], [0, 0]], origin=(0, 0, 1e308))
+
+
+STEPS = st.sampled_from([0.25, 1.0, 3.0])
+
+
+@given(
+    st.integers(0, 2**20), st.integers(2, 5), st.integers(2, 5), st.sampled_from([0.0, 0.2, 0.6, 1.0]),
+    st.one_of(STEPS, st.tuples(STEPS, STEPS), st.none()), st.sampled_from([None, (100.0, -50.0, 7.0)]),
+    st.sampled_from(sorted(FORMS)), st.sampled_from([0.0, 1000.0, -1000.0]),
+)  # fmt: skip
+@settings(max_examples=60)
+def test_a_height_field_has_two_faces_for_each_cell_whose_corners_are_known(
+    seed: int, rows: int, columns: int, unknown: float, spacing: Any, origin: Any, form: str, level: float
+) -> None:
+    """A face stays where its own corners are known; vertices that are not known lie within the bounds."""
+    rng = np.random.default_rng(seed)
+    heights = rng.integers(-9, 9, (rows, columns)) / 4.0 + level
+    heights[rng.random((rows, columns)) < unknown] = np.nan
+    options = {} if spacing is None else {"spacing": spacing}
+    options |= {} if origin is None else {"origin": origin}
+    mesh = heightfield_mesh(FORMS[form](heights), **options)
+    step_x, step_y = np.broadcast_to(1.0 if spacing is None else spacing, 2)
+    x0, y0, z0 = origin or (0.0, 0.0, 0.0)
+    known = ~np.isnan(heights)
+    faces = []
+    for row in range(rows - 1):
+        for column in range(columns - 1):
+            a, b = row * columns + column, row * columns + column + 1
+            c, d = b + columns, a + columns
+            faces += [face for face in ([a, b, c], [a, c, d]) if known.ravel()[face].all()]
+    assert mesh.faces.tolist() == faces
+    grid = mesh.vertices.reshape(rows, columns, 3)
+    np.testing.assert_array_equal(grid[..., 0], np.broadcast_to(x0 + step_x * np.arange(columns), (rows, columns)))
+    np.testing.assert_array_equal(grid[..., 1].T, np.broadcast_to(y0 + step_y * np.arange(rows), (columns, rows)))
+    np.testing.assert_array_equal(grid[..., 2][known], heights[known] + z0)
+    if known.any():
+        assert grid[..., 2].min() == heights[known].min() + z0 and grid[..., 2].max() == heights[known].max() + z0
+    assert (mesh.face_normals()[:, 2] > 0.0).all()

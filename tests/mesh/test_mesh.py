@@ -1,7 +1,6 @@
 """Mesh: its checks at the boundary and the laws of what it derives."""
 
 import dataclasses
-import doctest
 import re
 from typing import Any
 
@@ -12,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from renderer.errors import MeshError
-from renderer.mesh import mesh as mesh_module
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, grid, icosphere, torus
 
@@ -39,21 +37,6 @@ def affine(linear: Any, shift: Any = (0, 0, 0)) -> np.ndarray:
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = linear, shift
     return matrix
-
-
-@cases("dtype", [np.float32, np.float64, np.int16, list])
-def test_accepts_real_numbers_of_any_type(dtype: Any) -> None:
-    vertices = TRIANGLE["vertices"] if dtype is list else np.array(TRIANGLE["vertices"], dtype=dtype)
-    mesh = Mesh(vertices, TRIANGLE["faces"])
-    assert mesh.vertices.dtype == np.float64 and mesh.vertices.flags.c_contiguous
-    assert mesh.vertices.tolist() == TRIANGLE["vertices"]
-
-
-@cases("dtype", [np.int8, np.uint8, np.int64, np.uint64])
-def test_accepts_any_integer_faces(dtype: Any) -> None:
-    mesh = Mesh(TRIANGLE["vertices"], np.asfortranarray(np.array([[0, 1, 2], [2, 1, 0]], dtype=dtype)))
-    assert mesh.faces.dtype == np.int32 and mesh.faces.flags.c_contiguous
-    assert mesh.faces.tolist() == [[0, 1, 2], [2, 1, 0]]
 
 
 def test_is_read_only_and_apart_from_the_callers_arrays() -> None:
@@ -99,11 +82,6 @@ def test_says_what_is_wrong(change: dict[str, Any], message: str) -> None:
         Mesh(**(TRIANGLE | change), name="pot")
 
 
-def test_the_docstrings_examples_hold() -> None:
-    results = doctest.testmod(mesh_module)
-    assert results.attempted > 0 and results.failed == 0
-
-
 def test_a_mesh_that_views_arrays_has_them_and_checks_their_values() -> None:
     """Of each name its own, nothing copied, and none that is not given."""
     arrays: dict[str, Any] = {
@@ -134,12 +112,6 @@ def test_may_be_empty() -> None:
     assert nothing.face_normals().shape == nothing.vertex_normals().shape == (0, 3)
     assert nothing.is_float32 and not nothing.is_closed()
     assert Mesh([[1, 2, 3]], []).vertex_normals().tolist() == [[0, 0, 0]]
-
-
-def test_bounds_and_extent() -> None:
-    mesh = Mesh([[1, 5, -1], [3, -2, 0], [2, 0, 4]], [[0, 1, 2]])
-    assert [corner.tolist() for corner in mesh.bounds] == [[1, -2, -1], [3, 5, 4]]
-    assert mesh.extent.tolist() == [2, 7, 5]
 
 
 def test_is_float32() -> None:

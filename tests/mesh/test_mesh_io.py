@@ -1,31 +1,25 @@
 """Mesh files: every format and fault, each from a fixture that the test writes itself."""
 
 import itertools
-import os
 import re
 import struct
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import plyfile
 import pytest
 import trimesh
 from cases import cases
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from ply_bytes import FORMATS, Rows, ply
 
 from renderer.errors import MeshError
-from renderer.mesh import load as mesh_io
 from renderer.mesh import obj
 from renderer.mesh.load import load_mesh, save_ply
 from renderer.mesh.mesh import Mesh, RepairWarning
-from renderer.mesh.obj import parse_obj
-from renderer.mesh.ply import format_ply, parse_ply
-from renderer.mesh.shapes import box, torus
+from renderer.mesh.shapes import torus
 
 pytestmark = pytest.mark.judges("Mesh", "Mesh.triangles", "MeshError", "load_mesh")
 
@@ -53,44 +47,6 @@ def fault(folder: Path, content: bytes, name: str = "model.ply") -> str:
 # --- PLY that is right ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("form", FORMATS)
-def test_ply_triangles(tmp_path: Path, form: str) -> None:
-    mesh = load_bytes(tmp_path, ply(form, ("vertex", XYZ, SQUARE), ("face", INDICES, [[[0, 1, 2]], [[0, 2, 3]]])))
-    assert mesh.vertices.tolist() == SQUARE and mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
-    assert mesh.name == "model" and mesh.normals is mesh.colors is mesh.texcoords is None
-    assert load_mesh(tmp_path / "model.ply", name="pot").name == "pot"
-
-
-@cases("form", FORMATS)
-@cases("index", ["list uchar int vertex_index", "list int uint vertex_indices", "list ushort uchar vertex_index"])
-def test_ply_polygons_become_fans(tmp_path: Path, form: str, index: str) -> None:
-    vertices = [[np.cos(a), np.sin(a), 0.5] for a in np.arange(6)]
-    for polygons, expected in [
-        ([[[0, 1, 2, 3]], [[2, 3, 4, 5]]], [[0, 1, 2], [0, 2, 3], [2, 3, 4], [2, 4, 5]]),
-        ([[[0, 1, 2]], [[1, 2, 3, 4, 5]], [[5, 0, 1]], [[3, 2, 1, 0]]],
-         [[0, 1, 2], [1, 2, 3], [1, 3, 4], [1, 4, 5], [5, 0, 1], [3, 2, 1], [3, 1, 0]]),
-    ]:  # fmt: skip
-        mesh = load_bytes(
-            tmp_path, ply(form, ("vertex", ["double x", "double y", "double z"], vertices), ("face", [index], polygons))
-        )
-        assert mesh.faces.tolist() == expected
-        if form != "ascii":
-            assert mesh.vertices.tolist() == vertices
-
-
-@pytest.mark.parametrize("form", FORMATS)
-def test_ply_tristrips(tmp_path: Path, form: str) -> None:
-    """Strips of both parities, restarts first, last and doubled, two rows, a restart that shifts the parity."""
-    vertices = [[k // 2, k % 2, 0] for k in range(9)]
-    rows = [[[0, 1, 2, 3, -1, 2, 3, 4, 5, 6, -1, -1]], [[-1, 4, 5, 6]]]
-    mesh = load_bytes(
-        tmp_path, ply(form, ("vertex", XYZ, vertices), ("tristrips", ["list int int vertex_indices"], rows))
-    )
-    assert mesh.faces.tolist() == [[0, 1, 2], [2, 1, 3], [2, 3, 4], [4, 3, 5], [4, 5, 6], [4, 5, 6]]
-    # 0 1 2 3 ... zigzags, so a right alternation faces every triangle the same way.
-    assert len({tuple(normal) for normal in mesh.face_normals().tolist()}) == 1
-
-
 # An L that no fan from its first corner covers, in a slanted plane, between two triangles.
 NOTCHED = [[2, 1, 2], [1, 1, 1], [1, 2, 1], [0, 2, 0], [0, 0, 0], [2, 0, 2]]
 
@@ -108,63 +64,6 @@ def assert_notched(mesh: Mesh) -> None:
 def test_ply_notched_polygons_are_cut_right(tmp_path: Path, form: str) -> None:
     faces: Rows = [[[0, 1, 2]], [[0, 1, 2, 3, 4, 5]], [[3, 4, 5]]]
     assert_notched(load_bytes(tmp_path, ply(form, ("vertex", XYZ, NOTCHED), ("face", INDICES, faces))))
-
-
-def test_ply_strips_and_faces_keep_the_files_order(tmp_path: Path) -> None:
-    face = ("face", INDICES, [[[0, 1, 2]]])
-    strip = ("tristrips", ["list int int vertex_indices"], [[[3, 2, 1]]])
-    vertex = ("vertex", XYZ, SQUARE)
-    assert load_bytes(tmp_path, ply("ascii", vertex, face, strip)).faces.tolist() == [[0, 1, 2], [3, 2, 1]]
-    assert load_bytes(tmp_path, ply("ascii", strip, vertex, face)).faces.tolist() == [[3, 2, 1], [0, 1, 2]]
-
-
-@pytest.mark.parametrize("form", FORMATS)
-def test_ply_stitching_triangles_keep_the_parity(tmp_path: Path, form: str) -> None:
-    rows: Rows = [[[0, 1, 2, 2, 1, 3]]]
-    mesh = load_bytes(
-        tmp_path, ply(form, ("vertex", XYZ, SQUARE), ("tristrips", ["list int int vertex_indices"], rows))
-    )
-    assert mesh.faces.tolist() == [[0, 1, 2], [2, 1, 2], [2, 2, 1], [1, 2, 3]]
-
-
-@pytest.mark.parametrize("form", FORMATS)
-def test_ply_ignores_what_it_need_not_know(tmp_path: Path, form: str) -> None:
-    vertex = ["uchar flag", "float x", "list uchar short rings", "double y", "float z", "float quality"]
-    rows: Rows = [[7, *p[:1], [1] * k, *p[1:], 0.5] for k, p in enumerate(SQUARE)]
-    face = ["int group", "list uchar float texcoord", "list uchar int vertex_indices", "uchar red"]
-    mesh = load_bytes(
-        tmp_path,
-        ply(
-            form,
-            ("material", ["float shine", "list uchar char note"], [[1.0, [1, 2]], [2.0, []]]),
-            ("vertex", vertex, rows),
-            ("nothing", ["int a", "list uchar int b"], []),
-            ("face", face, [[1, [0.5] * 6, [0, 1, 2], 9], [2, [], [0, 1, 2, 3], 8]]),
-            ("edge", ["int vertex1", "int vertex2"], [[0, 1]]),
-        ),
-    )
-    assert mesh.vertices.tolist() == SQUARE and mesh.faces.tolist() == [[0, 1, 2], [0, 1, 2], [0, 2, 3]]
-    assert mesh.colors is None and mesh.texcoords is None
-
-
-@cases("form", FORMATS)
-@cases("names", [("s", "t"), ("u", "v"), ("texture_u", "texture_v")])
-@cases(("type_", "full"), [("uchar", 255), ("ushort", 65535), ("float", 1.0)])
-def test_ply_keeps_normals_colors_texcoords(tmp_path: Path, form: str, names: Any, type_: str, full: float) -> None:
-    properties = [
-        *XYZ,
-        "float nx",
-        "float ny",
-        "float nz",
-        *(f"{type_} {c}" for c in ("red", "green", "blue", "alpha")),
-    ]
-    properties += [f"float {name}" for name in names]
-    zero = type(full)(0)
-    rows: Rows = [[*p, 0, 0, 1, full, zero, full, zero, 0.25, k] for k, p in enumerate(SQUARE)]
-    mesh = load_bytes(tmp_path, ply(form, ("vertex", properties, rows), ("face", INDICES, [[[0, 1, 2]]])))
-    assert mesh.normals is not None and mesh.normals.tolist() == [[0, 0, 1]] * 4
-    assert mesh.colors is not None and mesh.colors.tolist() == [[1, 0, 1]] * 4
-    assert mesh.texcoords is not None and mesh.texcoords.tolist() == [[0.25, k] for k in range(4)]
 
 
 @pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
@@ -191,62 +90,6 @@ def test_ply_binary_may_be_padded(tmp_path: Path) -> None:
         [0, 1, 2]
     ]
     assert "after the last element" in fault(tmp_path, ply("binary_little_endian", *elements, trailing=b"\0\0\0\1"))
-
-
-@pytest.mark.parametrize("exact", [True, False])
-def test_save_ply_and_back(tmp_path: Path, exact: bool) -> None:
-    vertices = np.random.default_rng(1).normal(size=(50, 3))
-    if exact:
-        vertices = vertices.astype(np.float32).astype(np.float64)
-    rng = np.random.default_rng(2)
-    mesh = Mesh(vertices, rng.integers(0, 50, (80, 3), dtype=np.int32), normals=rng.normal(size=(50, 3)),
-                colors=rng.random((50, 3), dtype=np.float32), texcoords=rng.random((50, 2)), name="pot")  # fmt: skip
-    path = tmp_path / "pot.ply"
-    path.write_bytes(b"old")
-    save_ply(mesh, path)
-    loaded = load_mesh(path)
-    for field in ("vertices", "faces", "normals", "colors", "texcoords", "name"):
-        assert np.array_equal(getattr(loaded, field), getattr(mesh, field)), field
-    assert [p.name for p in tmp_path.iterdir()] == ["pot.ply"]
-    # Readers that nobody here wrote see the same mesh.
-    foreign = plyfile.PlyData.read(path)
-    assert foreign["vertex"]["x"].dtype == ("<f4" if exact else "<f8")
-    assert np.array_equal(np.stack([foreign["vertex"][axis] for axis in "xyz"], axis=1), mesh.vertices)
-    assert np.array_equal(np.stack(foreign["face"]["vertex_indices"]), mesh.faces)
-    assert np.array_equal(trimesh.load_mesh(path, process=False).triangles, mesh.triangles)
-
-
-def test_save_ply_leaves_nothing_half_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "pot.ply"
-    save_ply(box(), path)
-    before = path.read_bytes()
-
-    def disk_full(source: Path, target: Path) -> None:
-        assert source.exists()
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "replace", disk_full)
-    with pytest.raises(OSError, match="No space"):
-        save_ply(torus(), path)
-    assert [p.name for p in tmp_path.iterdir()] == ["pot.ply"] and path.read_bytes() == before
-
-
-@pytest.mark.parametrize("text", [True, False])
-def test_ply_against_plyfile(tmp_path: Path, text: bool) -> None:
-    """A random file of mixed polygons, written and read by plyfile."""
-    rng = np.random.default_rng(5)
-    vertices = np.array([tuple(row) for row in rng.normal(size=(40, 3))], dtype=[("x", "f8"), ("y", "f4"), ("z", "f8")])
-    polygons = np.empty(60, dtype=[("flag", "u1"), ("vertex_indices", object)])
-    polygons["flag"] = 1
-    for k in range(60):
-        polygons["vertex_indices"][k] = rng.integers(0, 40, rng.integers(3, 8)).astype("i4")
-    elements = [plyfile.PlyElement.describe(vertices, "vertex"), plyfile.PlyElement.describe(polygons, "face")]
-    plyfile.PlyData(elements, text=text, byte_order=">").write(str(tmp_path / "a.ply"))
-    mesh = load_mesh(tmp_path / "a.ply")
-    # plyfile writes text with 18 digits, enough for every double.
-    assert np.array_equal(mesh.vertices, np.stack([vertices[axis].astype(np.float64) for axis in "xyz"], axis=1))
-    expected = [[p[0], p[k], p[k + 1]] for p in polygons["vertex_indices"] for k in range(1, len(p) - 1)]
-    assert mesh.faces.tolist() == expected
 
 
 def test_many_faces_load_without_a_step_a_face(tmp_path: Path) -> None:
@@ -277,7 +120,6 @@ def colored(type_: str, value: float) -> tuple[str, list[str], Rows]:
     ("elements", "message"),
     [
         ([VERTEX], "holds no faces"),
-        ([VERTEX, ("face", INDICES, [])], "holds no faces"),
         ([VERTEX, ("tristrips", STRIPS, [[[]], [[-1, -1]]])], "holds no faces"),
         ([], "expected an element 'vertex', got no element"),
         ([FACE], "expected an element 'vertex', got face"),
@@ -290,15 +132,12 @@ def colored(type_: str, value: float) -> tuple[str, list[str], Rows]:
         ([VERTEX, ("face", INDICES, [[[0, 1, 4]]])], "faces: expected indices from 0 to 3, got 4 in row 0"),
         ([VERTEX, ("face", INDICES, [[[0, 1, 2]], [[0, -1, 2]]])], "indices from 0 to 3, got -1 in row 1"),
         ([VERTEX, ("face", INDICES, [[[0, 1, 2]], [[0, 1]]])], "expected at least 3 vertices, got 2 in row 1"),
-        ([VERTEX, ("face", INDICES, [[[]]])], "expected at least 3 vertices, got 0 in row 0"),
         ([VERTEX, ("face", FLOAT_INDICES, [[[0, 1.5, 2]]])], "expected whole vertex indices, got 1.5"),
         ([VERTEX, ("face", FLOAT_INDICES, [[[0, NAN, 2]]])], "expected whole vertex indices, got nan"),
         ([VERTEX, ("face", FLOAT_INDICES, [[[0, 2.0**60, 2]]])], "expected whole vertex indices, got 1.15"),
         ([VERTEX, ("tristrips", STRIPS, [[[0, 1, 2, -2]]])], "faces: expected indices from 0 to 3, got -2"),
         ([VERTEX, ("tristrips", STRIPS, [[[0, 1, 2, -1, 3]]])], "expected at least 3 vertices in each strip"),
-        ([VERTEX, ("tristrips", STRIPS, [[[0, 1]], [[2, 3, 0]]])], "expected at least 3 vertices in each strip"),
         ([("vertex", XYZ, [*SQUARE[:3], [0, NAN, 0]]), FACE], "expected finite values, got [0.0, nan, 0.0] in row 3"),
-        ([("vertex", XYZ, [*SQUARE[:3], [-np.inf, 0, 0]]), FACE], "vertices: expected finite values"),
         ([colored("char", 1), FACE], "expected colours of an unsigned or floating type, got int8"),
         ([colored("float", 9), FACE], "colors: expected values in [0, 1], got [9.0, 9.0, 9.0] in row 0"),
     ],
@@ -314,21 +153,13 @@ GOOD = ply("ascii", VERTEX, FACE).decode()
     ("old", "new", "message"),
     [
         ("ply\n", "plx\n", "expected a first line 'ply', got b'plx"),
-        ("ply\n", "", "expected a first line 'ply'"),
         ("format ascii 1.0\n", "", "expected a line 'format', found none"),
         ("format ascii 1.0\n", "format ascii 1.0\nformat ascii 1.0\n", "header line 3"),
         ("format ascii 1.0", "format ascii 2.0", "header line 2: expected a PLY header line, got 'format ascii 2.0'"),
-        ("format ascii", "format binary_middle_endian", "header line 2"),
         ("end_header\n", "", "expected a line 'end_header', found none"),
-        ("end_header", "xend_header", "expected a line 'end_header', found none"),
         ("element vertex 4", "element vertex -4", "header line 4: expected a PLY header line, got 'element vertex -4'"),
-        ("element vertex 4", "element vertex four", "header line 4"),
-        ("element vertex 4", "element vertex", "header line 4"),
-        ("element vertex 4", "element vertex 4 4", "header line 4"),
         ("element vertex 4", "element vertex 999999999999999999", "too short for the 999999999999999999 rows"),
         ("element vertex 4", "element vertex " + "9" * 5000, "header line 4"),
-        ("element face 1", "element face 3000000000", "truncated: too short for the 3000000000 rows of element face"),
-        ("element vertex 4", "element vertex 5", "truncated"),
         ("element vertex 4", "element vertex 3", "expected the end of the file"),
         ("element face 1", "element vertex 1", "element 'vertex' stands twice"),
         ("float y", "float x", "property 'x' stands twice"),
@@ -342,10 +173,8 @@ GOOD = ply("ascii", VERTEX, FACE).decode()
         ("3 0 1 2", "3 0 1", "truncated"),
         ("3 0 1 2", "2.5 0 1 2", "element face: list length 2.5 in row 0"),
         ("3 0 1 2", "-3 0 1 2", "element face: list length -3.0 in row 0"),
-        ("3 0 1 2", "nan 0 1 2", "element face: list length nan in row 0"),
         ("3 0 1 2", "inf 0 1 2", "element face: list length inf in row 0"),
         ("3 0 1 2", "4294967296 0 1 2", "element face: list length 4294967296.0 in row 0"),
-        ("3 0 1 2", "4294967295 0 1 2", "truncated"),
         ("3 0 1 2", "3 0 1.5 2", "expected whole vertex indices, got 1.5"),
     ],
 )
@@ -365,11 +194,6 @@ def test_ply_binary_list_length_faults(tmp_path: Path, count: int) -> None:
         broken = content.replace(struct.pack("<i", length) + struct.pack("<i", 0), struct.pack("<ii", count, 0))
         assert broken != content
         assert ("list length -1" if count < 0 else "truncated") in fault(tmp_path, broken)
-
-
-def test_ply_of_garbage(tmp_path: Path) -> None:
-    for content in (b"", b"p", b"ply", b"\0" * 1000, b"ply\n" + b"\xff" * 3_000_000, bytes(range(256)) * 10):
-        fault(tmp_path, content)
 
 
 RICH = [
@@ -431,40 +255,14 @@ def test_obj_faces(tmp_path: Path, text: str, faces: Any) -> None:
     assert mesh.vertices.tolist()[-4:] == SQUARE
 
 
-def test_obj_splits_vertices_where_texcoords_differ(tmp_path: Path) -> None:
-    text = V + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0.5 0.5\nvn 0 0 1\nf 1/1/1 2/2/1 3/3/1\nf 1/4/1 3/3/1 4/-1/-1\n"
-    mesh = load_bytes(tmp_path, text.encode(), "a.obj")
-    assert mesh.triangles.tolist() == [[SQUARE[k] for k in (0, 1, 2)], [SQUARE[k] for k in (0, 2, 3)]]
-    assert mesh.texcoords is not None and mesh.normals is not None
-    assert mesh.texcoords[mesh.faces].tolist() == [[[0, 0], [1, 0], [1, 1]], [[0.5, 0.5], [1, 1], [0.5, 0.5]]]
-    assert len(mesh.vertices) == 5 and mesh.normals.tolist() == [[0, 0, 1]] * 5
-
-
-def test_obj_where_only_some_faces_have_texcoords_and_normals(tmp_path: Path) -> None:
-    mesh = load_bytes(tmp_path, (V + "vt 0.5 1\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\nf 1 3 4\n").encode(), "a.obj")
-    assert mesh.texcoords is not None and mesh.normals is None
-    assert mesh.texcoords[mesh.faces].tolist() == [[[0.5, 1]] * 3, [[0, 0]] * 3]
-
-
-def test_obj_vertex_colors(tmp_path: Path) -> None:
-    mesh = load_bytes(tmp_path, b"v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 0.5\nf 1 2 3\n", "a.obj")
-    assert mesh.colors is not None and mesh.colors.tolist() == [[1, 0, 0], [0, 1, 0], [0, 0, 0.5]]
-    mixed = load_bytes(tmp_path, b"v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "a.obj")
-    assert mixed.colors is None
-
-
 @cases(
     ("text", "message"),
     [
         ("", "holds no faces"),
-        (V, "holds no faces"),
         (V + "f 1 2 5\n", "line 5: face index out of range: expected 1 to 4 or -4 to -1, got 'f 1 2 5'"),
-        (V + "f 0 1 2\n", "line 5: face index out of range"),
-        (V + "f -5 1 2\n", "line 5: face index out of range"),
         (V + "f 1/1 2/1 3/1\n", "line 5: face index out of range"),
         (V + "f 1 2 3\nf 1 2\n", "line 6: expected a face of at least 3 vertices, got 'f 1 2'"),
         (V + "f 1 2 x\n", "line 5: "),
-        (V + "f 1 2 3.5\n", "line 5: "),
         (V + "f 1/1/1/1 2 3\n", "line 5: expected a corner like"),
         ("v 0 0\n" + V + "f 1 2 3\n", "line 1: expected at least 3 numbers, got 'v 0 0'"),
         ("v 0 0 nan\n" + V + "f 2 3 4\n", "vertices: expected finite values, got [0.0, 0.0, nan] in row 0"),
@@ -502,6 +300,19 @@ def test_obj_notched_polygons_are_cut_right(tmp_path: Path, face: str) -> None:
 def test_obj_faces_may_stand_before_their_vertices(tmp_path: Path, text: str, faces: Any, indent: str) -> None:
     mesh = load_bytes(tmp_path, text.replace("f", indent + "f").encode(), "a.obj")
     assert mesh.vertices.tolist() == SQUARE and mesh.faces.tolist() == faces
+
+
+def test_obj_vertex_colors(tmp_path: Path) -> None:
+    mesh = load_bytes(tmp_path, b"v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 0.5\nf 1 2 3\n", "a.obj")
+    assert mesh.colors is not None and mesh.colors.tolist() == [[1, 0, 0], [0, 1, 0], [0, 0, 0.5]]
+    mixed = load_bytes(tmp_path, b"v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "a.obj")
+    assert mixed.colors is None
+
+
+def test_obj_statements_may_end_in_a_comment(tmp_path: Path) -> None:
+    path = tmp_path / "a.obj"
+    path.write_text("v 0 0 0 # a corner\nv 1 0 0\nv 0 1 0 #\nf 1 2 3 # 4 5_6\n#f 9\n")
+    assert load_mesh(path).faces.tolist() == [[0, 1, 2]]
 
 
 def test_obj_attributes_may_stand_after_their_faces(tmp_path: Path) -> None:
@@ -590,13 +401,6 @@ def test_obj_both_readers_agree_on_each_odd_statement(odd: str) -> None:
                     pytest.fail(f"taken by one, refused by the other: {error}")
 
 
-def test_obj_a_byte_that_belongs_in_no_face_makes_a_file_no_common_one() -> None:
-    """No byte is passed over or read as the end of the numbers."""
-    vertices = b"v 1 2 3\nv 3 4 6\nv 1 0 0\n"
-    for byte in sorted({*range(256)} - {*b"0123456789/ \t\r\n"}):
-        assert obj._read_common(vertices + b"f 1 2 3%c\n" % byte) is None, byte
-
-
 @settings(deadline=None, max_examples=200)
 @given(
     st.lists(st.sampled_from(COMMON), max_size=20),
@@ -615,61 +419,8 @@ def test_obj_files_of_the_common_shape_are_read_as_such(
     assert read_both(content) == bool(faces or slashed)
 
 
-@settings(deadline=None, max_examples=200)
-@given(st.lists(st.lists(st.floats(allow_nan=True), min_size=7, max_size=7), min_size=3, max_size=8), st.booleans())
-def test_obj_any_number_is_read_by_both(rows: list[list[float]], short: bool) -> None:
-    """Every float64 as Python writes it, colours, and more digits than any holds."""
-    lines = ["v " + " ".join(f"{x:.30e}" if short else repr(x) for x in row) for row in rows]
-    assert read_both("\n".join([*lines, "f 1//1 2//1 3//1", "vn 1 1 1"]).encode())
-
-
-def test_obj_corners_are_split_as_sorted_rows(tmp_path: Path) -> None:
-    """With one attribute a position or several: rows in the order of their positions, then attributes."""
-    rng = np.random.default_rng(4)
-    for same in (True, False):
-        corners = rng.integers(0, 50, (300, 3))
-        if same:
-            corners = np.stack([corners[:, 0], (corners[:, 0] * 7) % 50, corners[:, 0]], axis=1)
-        distinct, inverse = obj.distinct_rows(corners, 50)
-        expected, places = np.unique(corners, axis=0, return_inverse=True)
-        assert np.array_equal(distinct, expected) and np.array_equal(inverse, places.ravel())
-
-
-def test_obj_the_common_reader_is_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(obj, "_read_any", lambda *_: pytest.fail("read line by line"))
-    for face in ("f 1 2 3", "f 1/1/1 2/1/1 3/1/1", "f 1//1 2//1 3//1", "f 1/1 2/1 3/1 4/1"):
-        parse_obj((V + f"vt 0 0\nvn 0 0 1\n{face}\n").encode())
-    content = (V + "f 1 2 3\nf 1 3 4 2\n").encode()
-    assert parse_obj(content).faces.tolist() == [[0, 1, 2], [0, 2, 3], [0, 3, 1]]
-
-
-def test_obj_loads_no_slower_than_trimesh(tmp_path: Path) -> None:
-    """It takes 0.6 of trimesh's processor time, which other processes hardly change."""
-    mesh = torus(around=75, across=50)
-    vertices = "".join("v {:.9g} {:.9g} {:.9g}\n".format(*p) for p in mesh.vertices)
-    corners = (mesh.faces + 1).tolist()
-    for form, more in [("{0}", ""), ("{0}/{0}/{0}", "vt 0.5 0.25\nvn 0.6 0.8 0\n" * len(mesh.vertices))]:
-        path = tmp_path / "torus.obj"
-        path.write_text(vertices + more + "".join(f"f {' '.join(form.format(k) for k in t)}\n" for t in corners))
-        times: dict[str, list[float]] = {"ours": [], "trimesh": []}
-        for _ in range(5):
-            for name, load in [("ours", load_mesh), ("trimesh", lambda path: trimesh.load(path, process=False))]:
-                start = time.process_time()
-                load(path)
-                times[name].append(time.process_time() - start)
-        assert min(times["ours"]) < min(times["trimesh"]), times
-
-
 def foreign_box() -> trimesh.Trimesh:
     return trimesh.creation.box(extents=(1, 2, 4))
-
-
-@pytest.mark.parametrize("kind", ["stl", "stl_ascii"])
-def test_stl(tmp_path: Path, kind: str) -> None:
-    source = foreign_box()
-    content = source.export(file_type=kind)
-    mesh = load_bytes(tmp_path, content if isinstance(content, bytes) else content.encode(), "a.STL")
-    assert np.array_equal(mesh.triangles, source.triangles) and mesh.normals is None
 
 
 def test_stl_text_of_two_solids_with_foreign_names(tmp_path: Path) -> None:
@@ -678,14 +429,6 @@ def test_stl_text_of_two_solids_with_foreign_names(tmp_path: Path) -> None:
     content = (one.format(1, 1) + one.format(2, 2)).encode("latin-1")
     assert load_bytes(tmp_path, content, "a.stl").vertices[:, 2].tolist() == [1, 0, 0, 2, 0, 0]
     assert "truncated" in fault(tmp_path, content[:-20], "a.stl")
-
-
-def test_stl_lines_may_end_in_a_carriage_return(tmp_path: Path) -> None:
-    """As those of PLY and OBJ may; it was called truncated."""
-    text = foreign_box().export(file_type="stl_ascii").encode()
-    for newline in (b"\r", b"\r\n"):
-        mesh = load_bytes(tmp_path, text.replace(b"\n", newline), "a.stl")
-        assert np.array_equal(mesh.triangles, foreign_box().triangles)
 
 
 def test_stl_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
@@ -720,34 +463,6 @@ def test_stl_faults(tmp_path: Path) -> None:
         fault(tmp_path, text[:length], "a.stl")
 
 
-def test_glb_places_each_instance(tmp_path: Path) -> None:
-    scene = trimesh.Scene()
-    scene.add_geometry(foreign_box(), transform=trimesh.transformations.translation_matrix([5, 0, 0]))
-    scene.add_geometry(foreign_box(), transform=np.diag([-1.0, 1, 1, 1]))
-    mesh = load_bytes(tmp_path, scene.export(file_type="glb"), "a.glb")
-    assert [corner.tolist() for corner in mesh.bounds] == [[-0.5, -1, -2], [5.5, 1, 2]]
-    assert len(mesh.faces) == 24 and mesh.is_closed()
-    a, b, c = np.moveaxis(mesh.triangles, 1, 0)
-    # Mirrored, the second box would count as -8 were its faces not turned.
-    assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(16, rel=1e-12)
-
-
-def test_glb_keeps_normals_colors_texcoords(tmp_path: Path) -> None:
-    normals = np.array([[0, 0, 1.0]] * 3)
-    source = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], vertex_normals=normals, process=False)
-    source.visual = trimesh.visual.ColorVisuals(
-        source, vertex_colors=[[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 51, 255]]
-    )
-    mesh = load_bytes(tmp_path, trimesh.Scene(source).export(file_type="glb", include_normals=True), "a.glb")
-    assert mesh.normals is not None and mesh.normals.tolist() == normals.tolist()
-    assert mesh.colors is not None and mesh.colors.tolist() == np.float32([[1, 0, 0], [0, 1, 0], [0, 0, 0.2]]).tolist()
-    uv = np.array([[0, 0], [1, 0], [0, 0.75]])
-    source = trimesh.Trimesh(source.vertices, source.faces, process=False)
-    source.visual = trimesh.visual.TextureVisuals(uv=uv, material=trimesh.visual.material.PBRMaterial())
-    mesh = load_bytes(tmp_path, trimesh.Scene(source).export(file_type="glb"), "a.glb")
-    assert mesh.texcoords is not None and mesh.texcoords.tolist() == uv.tolist() and mesh.normals is None
-
-
 def test_glb_faults(tmp_path: Path) -> None:
     content = trimesh.Scene(foreign_box()).export(file_type="glb")
     assert "expected a first word 'glTF', got b'glTX'" in fault(tmp_path, b"glTX" + content[4:], "a.glb")
@@ -776,73 +491,3 @@ def test_path_faults(tmp_path: Path) -> None:
     ]:
         with pytest.raises(MeshError, match=re.escape(f"{tmp_path / name}: ") + ".*" + re.escape(message)):
             load_mesh(tmp_path / name)
-
-
-def examples() -> dict[str, bytes]:
-    rich = [ply(form, *RICH) for form in FORMATS]
-    return {
-        "ascii.ply": rich[0],
-        "little.ply": rich[1],
-        "big.ply": rich[2],
-        "saved.ply": format_ply(box()),
-        "a.obj": (V + "vt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\nf 1 3 4\n").encode(),
-        "binary.stl": foreign_box().export(file_type="stl"),
-        "text.stl": foreign_box().export(file_type="stl_ascii").encode(),
-        "a.glb": trimesh.Scene(foreign_box()).export(file_type="glb"),
-    }
-
-
-EXAMPLES = examples()
-
-
-@pytest.mark.parametrize("name", EXAMPLES)
-@settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.too_slow])
-@given(st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 3), st.integers(0, 255)), min_size=1, max_size=8))
-def test_mutated_files_load_or_fail_clearly(name: str, mutations: list[tuple[int, int, int]]) -> None:
-    """Bytes changed, removed, added, cut off: a valid mesh or one MeshError, and no other exception or warning."""
-    content = bytearray(EXAMPLES[name])
-    for place, kind, value in mutations:
-        at = place % max(len(content), 1)
-        match kind:
-            case 0:
-                content[at : at + 1] = bytes([value])
-            case 1:
-                del content[at : at + 1]
-            case 2:
-                content[at:at] = bytes([value])
-            case 3 if value < 32:
-                del content[at:]
-    try:
-        mesh = mesh_io.parse_mesh(bytes(content), Path(name).suffix)
-    except MeshError as error:
-        assert "\n" not in str(error)
-    else:
-        assert len(mesh.faces) > 0 and mesh.faces.max() < len(mesh.vertices) and np.isfinite(mesh.vertices).all()
-
-
-@settings(deadline=None, max_examples=300)
-@given(st.binary(max_size=200))
-@example(b"1 " * 50)
-def test_ply_body_of_any_bytes(body: bytes) -> None:
-    for form in FORMATS:
-        header = ply(form, *RICH).split(b"end_header\n")[0]
-        try:
-            assert np.isfinite(parse_ply(header + b"end_header\n" + body).vertices).all()
-        except MeshError:
-            continue
-
-
-def test_the_mutation_test_would_see_a_reader_that_lets_an_exception_through(monkeypatch: pytest.MonkeyPatch) -> None:
-    def careless(content: bytes, repairs: object = None) -> Mesh:
-        raise KeyError("x")
-
-    monkeypatch.setitem(mesh_io._PARSERS, ".ply", careless)
-    run: Callable[..., None] = test_mutated_files_load_or_fail_clearly.hypothesis.inner_test  # type: ignore[attr-defined]
-    with pytest.raises(KeyError):
-        run("saved.ply", [(0, 0, 0)])
-
-
-def test_obj_statements_may_end_in_a_comment(tmp_path: Path) -> None:
-    path = tmp_path / "a.obj"
-    path.write_text("v 0 0 0 # a corner\nv 1 0 0\nv 0 1 0 #\nf 1 2 3 # 4 5_6\n#f 9\n")
-    assert load_mesh(path).faces.tolist() == [[0, 1, 2]]

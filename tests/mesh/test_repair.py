@@ -1,8 +1,6 @@
 """Repair: what is bad in a mesh is left out and reported; what is good stays as it was, to the bit."""
 
-import doctest
 import struct
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +12,8 @@ from hypothesis import strategies as st
 from meshes import assert_same_hits, make_mesh, rays_at
 
 from renderer.errors import MeshError
-from renderer.mesh import mesh as mesh_module
 from renderer.mesh.load import load_mesh
-from renderer.mesh.mesh import Mesh, Repairs, RepairWarning
-from renderer.mesh.shapes import icosphere
+from renderer.mesh.mesh import Mesh, RepairWarning
 from renderer.octree import BruteForce, Octree
 
 pytestmark = pytest.mark.judges(
@@ -43,26 +39,6 @@ def test_the_bad_is_dropped_and_reported() -> None:
     assert repairs and str(repairs) == "dropped 3 of 5 faces; 1 vertices are not finite"
 
 
-@cases("value", BAD)
-@cases("axis", range(3))
-def test_each_coordinate_counts(value: float, axis: int) -> None:
-    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], float)
-    vertices[3, axis] = value
-    mesh, repairs = Mesh.repaired(vertices, [[1, 3, 2], [0, 1, 2], [3, 3, 3]])
-    assert mesh.faces.tolist() == [[0, 1, 2]] and repairs.bad_vertices.tolist() == [3]
-    assert repairs.dropped_faces.tolist() == [0, 2]
-
-
-@cases("index", [3, -1, np.iinfo(np.int64).max, np.iinfo(np.int64).min, np.uint64(2**64 - 1), np.uint64(2**63)])
-@cases("corner", range(3))
-def test_each_corner_counts(index: Any, corner: int) -> None:
-    faces = np.array([[0, 1, 2], [0, 1, 2]], np.uint64 if isinstance(index, np.uint64) else np.int64)
-    faces[0, corner] = index
-    mesh, repairs = Mesh.repaired(VERTICES[:3], faces)
-    assert mesh.faces.tolist() == [[0, 1, 2]] and repairs.kept_faces.tolist() == [1]
-    assert repairs.dropped_faces.tolist() == [0] and not len(repairs.bad_vertices)
-
-
 def test_a_bad_vertex_that_no_face_names_is_reported() -> None:
     mesh, repairs = Mesh.repaired([*VERTICES[:3], [np.inf, 0, 0]], [[0, 1, 2]])
     assert repairs and repairs.bad_vertices.tolist() == [3] and not len(repairs.dropped_faces)
@@ -76,19 +52,6 @@ def test_right_input_stays_as_it_is(kind: str, seed: int, count: int) -> None:
     mesh, repairs = Mesh.repaired(vertices, faces)
     assert not repairs and repairs.kept_faces.tolist() == list(range(len(faces)))
     assert mesh.vertices.tobytes() == expected.vertices.tobytes() and mesh.faces.tobytes() == expected.faces.tobytes()
-
-
-def test_right_attributes_stay_as_they_are() -> None:
-    rng, ball = np.random.default_rng(3), icosphere(1)
-    count = len(ball.vertices)
-    given = {"normals": rng.normal(size=(count, 3)), "colors": rng.random((count, 3)),
-             "texcoords": rng.random((count, 2)), "name": "ball"}  # fmt: skip
-    expected = Mesh(ball.vertices, ball.faces, **given)  # type: ignore[arg-type]
-    mesh, repairs = Mesh.repaired(ball.vertices, ball.faces, **given)  # type: ignore[arg-type]
-    assert not repairs and mesh.name == "ball"
-    for name in ("vertices", "faces", "normals", "colors", "texcoords"):
-        ours, theirs = getattr(mesh, name), getattr(expected, name)
-        assert ours.dtype == theirs.dtype and ours.tobytes() == theirs.tobytes(), name
 
 
 @given(st.integers(0, 2**20), st.integers(1, 30), st.floats(0, 0.5))
@@ -128,50 +91,11 @@ def test_the_given_arrays_stay() -> None:
     assert [a.tobytes() for a in (vertices, faces, normals)] == before
 
 
-@cases(
-    ("change", "message"),
-    [
-        ({"vertices": [[0, 0], [1, 1]]}, "vertices: expected shape"),
-        ({"vertices": [["a", "b", "c"]]}, "vertices: expected real numbers"),
-        ({"vertices": None}, "vertices: expected real numbers"),
-        ({"faces": [[0.0, 1.0, 2.0]]}, "faces: expected integers"),
-        ({"faces": [[0, 1]]}, "faces: expected shape"),
-        ({"normals": [[0, 0, 1]]}, "normals: expected a row a vertex, 5, got 1"),
-        ({"texcoords": [[0, np.nan]] * 5}, "texcoords: expected finite values"),
-        ({"colors": [[0, 0, 2]] * 5}, "colors: expected values in [0, 1]"),
-    ],
-)
-def test_other_faults_stay_errors(change: dict[str, Any], message: str) -> None:
-    with pytest.raises(MeshError) as caught:
-        Mesh.repaired(**{"vertices": VERTICES, "faces": FACES, "name": "pot", **change})
-    assert str(caught.value).startswith(f"pot: {message}")
-
-
-def test_nothing_good_is_an_empty_mesh() -> None:
-    for vertices, faces in (([], FACES), (np.full((5, 3), np.nan), FACES), ([], [])):
-        mesh, repairs = Mesh.repaired(vertices, faces)
-        assert mesh.faces.shape == (0, 3) and len(repairs.dropped_faces) == len(faces)
-        assert not Octree(vertices, faces, repair=True).closest_hit(*RAYS).hit.any()
-
-
-def test_the_docstrings_examples_hold() -> None:
-    run = doctest.DocTestRunner()
-    for thing in (Repairs, Mesh.repaired):
-        for example in doctest.DocTestFinder().find(thing, globs=vars(mesh_module).copy()):
-            run.run(example)
-    assert run.tries >= 5 and run.failures == 0
-
-
 # --- accelerators ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("accelerator", [Octree, BruteForce])
 class TestAccelerators:
-    def test_bad_arrays_are_errors_unless_repair_is_asked_for(self, accelerator: Any) -> None:
-        for options in ({}, {"repair": False}):
-            with pytest.raises(MeshError, match=r"vertices: expected finite values, .* in row 3"):
-                accelerator(VERTICES, FACES, **options)
-
     def test_hits_name_the_repaired_mesh(self, accelerator: Any) -> None:
         built = accelerator(VERTICES, FACES, repair=True)
         hits = built.closest_hit(*RAYS)
@@ -253,14 +177,6 @@ def test_files(tmp_path: Path, name: str) -> None:
     assert mesh.triangles.tolist() == [[VERTICES[k] for k in face] for face in (FACES[0], FACES[4])]
     assert mesh.name == path.stem
     assert Octree.from_mesh(mesh).closest_hit(*RAYS).face.tolist() == [0, 1, -1]
-
-
-def test_a_file_without_faults_loads_without_a_warning(tmp_path: Path) -> None:
-    path = tmp_path / "good.ply"
-    path.write_bytes(ply_text("0 0 0,1 0 0,0 1 0", "3 0 1 2"))
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert load_mesh(path, repair=True).faces.tolist() == load_mesh(path).faces.tolist()
 
 
 @cases(

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 import trimesh
 from cases import cases
 
@@ -12,7 +11,6 @@ from renderer import Mesh, load_mesh
 from renderer.mesh.load import save_ply
 
 NAMES = {"normals": ("nx", "ny", "nz"), "colors": ("red", "green", "blue"), "texcoords": ("s", "t")}
-TYPES = {"float": "<f4", "double": "<f8"}
 
 
 def mesh_with(attributes: tuple[str, ...], exact: bool) -> Mesh:
@@ -46,19 +44,3 @@ def test_a_file_has_what_the_mesh_has_and_nothing_else(
     again = load_mesh(tmp_path / "a.ply")
     for each in ("vertices", "faces", *NAMES):
         np.testing.assert_array_equal(getattr(again, each), getattr(mesh, each))
-
-
-@pytest.mark.parametrize("exact", [True, False])
-def test_its_bytes_are_those_that_its_header_says(tmp_path: Path, exact: bool) -> None:
-    mesh = mesh_with(tuple(NAMES), exact)
-    save_ply(mesh, tmp_path / "a.ply")
-    header, body = (tmp_path / "a.ply").read_bytes().split(b"end_header\n", 1)
-    assert header.startswith(b"ply\nformat binary_little_endian 1.0\n")
-    properties = [line.split()[1:] for line in header.decode().splitlines() if line.startswith("property")]
-    assert properties.pop() == ["list", "uchar", "int", "vertex_indices"]
-    rows = np.dtype([(name, TYPES[kind]) for kind, name in properties])
-    vertices = np.frombuffer(body, rows, 5)
-    np.testing.assert_array_equal(np.stack([vertices[name] for name in "xyz"], axis=1), mesh.vertices)
-    assert rows["x"] == ("<f4" if exact else "<f8") and rows["nx"] == rows["s"] == "<f8" and rows["red"] == "<f4"
-    faces = np.frombuffer(body[5 * rows.itemsize :], [("count", "u1"), ("corners", "<i4", 3)])
-    assert faces["count"].tolist() == [3, 3, 3] and faces["corners"].tolist() == mesh.faces.tolist()

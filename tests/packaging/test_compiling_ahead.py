@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from cases import cases
 from signatures import SIGNATURES
 
 ROOT = Path(__file__).parents[2]
@@ -161,22 +160,6 @@ print(digest.hexdigest(), compile_seconds())
         said.append(out.stdout.split())
     assert said[0][0] == said[1][0] and float(said[1][1]) == 0.0
     assert not list((tmp_path / "empty").rglob("*.kernel"))
-
-
-@cases(
-    ("arguments", "told"),
-    [
-        (["--level", "x86-64-v3"], "--output: expected a folder, as kernels for a level are not this machine's"),
-        (["--level", "x86-64-v9", "-o", "x"], "invalid choice: 'x86-64-v9'"),
-        (["--queries", "--pictures"], "not allowed with argument"),
-        (["--pictures", "--all"], "not allowed with argument"),
-        (["--all", "--queries"], "not allowed with argument"),
-    ],
-)
-def test_what_compile_does_not_take_is_one_line(arguments, told):
-    command = [sys.executable, "-P", "-m", "renderer", "compile", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
-    assert done.returncode == 2 and told in done.stderr.splitlines()[-1]
 
 
 def test_compile_shows_on_a_terminal_how_far_it_is():

@@ -112,12 +112,6 @@ def test_a_wheel_for_one_platform_is_made_as_the_page_says(checkout):
     assert tagged.name.endswith("-cp311-cp311-manylinux_2_28_x86_64.whl")
 
 
-def test_hooks_are_installed_into_a_checkout(checkout):
-    run(["git", "init", "--quiet"], checkout)
-    run([sys.executable, "-m", "pre_commit", "install"], checkout)
-    assert "pre-commit" in (checkout / ".git" / "hooks" / "pre-commit").read_text()
-
-
 @pytest.fixture(scope="module")
 def project(checkout, tmp_path_factory):
     """Another project, with the files that the guide's workflow names."""

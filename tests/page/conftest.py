@@ -27,6 +27,9 @@ def url(scenes: Path) -> Iterator[str]:
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     playwright = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
+    pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
+    if CHROMIUM is None:
+        pytest.skip("no Chromium: apt-get install chromium")
     with playwright.sync_playwright() as engine:
         chromium = engine.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         yield chromium
@@ -36,9 +39,8 @@ def browser() -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def opened(browser: Any, url: str) -> Iterator[Viewer]:
     """The page that most tests share, because opening one takes a second."""
-    page = Viewer(browser, url).open()
-    yield page
-    page.context.close()
+    with Viewer(browser, url).open() as page:
+        yield page
 
 
 @pytest.fixture

@@ -7,27 +7,19 @@ from typing import Any
 import numpy as np
 import pytest
 from cases import cases
-from viewer_page import CHROMIUM, Viewer
+from viewer_client import seen_by
+from viewer_page import Viewer
 
-pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
-pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
-
-
-import renderer
 from renderer import load_scene
-from renderer.picture.image import srgb
 from renderer.viewer import passes
 from renderer.viewer.protocol import CameraMessage
-
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
 
 
 @pytest.fixture(scope="module")
 def dense(browser: Any, url: str) -> Iterator[Viewer]:
     """A page on a screen with two device pixels along each CSS pixel's side."""
-    page = Viewer(browser, url, viewport={"width": 1180, "height": 760}, device_scale_factor=2).open()
-    yield page
-    page.context.close()
+    with Viewer(browser, url, viewport={"width": 1180, "height": 760}, device_scale_factor=2).open() as page:
+        yield page
 
 
 def test_pictures_have_the_screens_pixels(dense: Viewer, scenes: Path) -> None:
@@ -35,12 +27,8 @@ def test_pictures_have_the_screens_pixels(dense: Viewer, scenes: Path) -> None:
     stage = dense.page.evaluate("() => [viewer.stage.clientWidth, viewer.stage.clientHeight]")
     assert [dense.camera["w"], dense.camera["h"]] == [2 * side for side in stage]
     assert dense.camera["w"] * dense.camera["h"] > passes.BAND_PIXELS
-    scene, shown = load_scene(scenes / "blocks.toml"), dense.camera
-    from renderer.viewer.viewpoint import camera_of
-
-    seen = scene.model_copy(update={"camera": camera_of(shown["m"], shown["fovy"])})
-    expected = renderer.render(seen, resolution=(shown["w"], shown["h"]))
-    assert np.array_equal(dense.pixels("picture")[..., :3], srgb(expected.radiance))
+    expected = seen_by(dense.camera, load_scene(scenes / "blocks.toml"))
+    assert np.array_equal(dense.pixels("picture")[..., :3], expected.srgb)
 
 
 def test_bands_are_drawn_over_the_whole_picture_before(dense: Viewer) -> None:

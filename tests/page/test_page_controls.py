@@ -5,12 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from viewer_page import CHROMIUM, Viewer
-
-pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
-pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
-
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
+from viewer_page import Viewer
 
 
 @pytest.mark.parametrize(
@@ -45,13 +40,6 @@ def test_letters_mean_the_stage_where_a_slider_is_focused_and_arrows_the_slider(
     viewer.wait_until(lambda: viewer.camera["m"] != before)
     viewer.page.keyboard.press("2")
     viewer.settled("phong")
-
-
-def test_who_comes_by_keyboard_stays_on_the_control(viewer: Viewer) -> None:
-    viewer.page.focus("[name=shadows]")
-    viewer.page.keyboard.press("Space")
-    assert not viewer.page.is_checked("[name=shadows]")
-    assert viewer.page.evaluate("() => document.activeElement.name") == "shadows"
 
 
 def picked(viewer: Viewer) -> str:
@@ -117,17 +105,6 @@ def test_light_and_camera_are_reset_each_by_itself(viewer: Viewer) -> None:
     viewer.page.locator("#stage").press("r")
     viewer.settled("octree")
     assert np.array_equal(viewer.pixels("picture"), own) and not np.array_equal(own, lit)
-
-
-@pytest.mark.parametrize(("value", "share"), [("0.5", "half as wide and high"), ("0.25", "a quarter as wide and high")])
-def test_a_share_of_the_window_is_what_its_name_says(viewer: Viewer, value: str, share: str) -> None:
-    """Half of each side was called half the pixels."""
-    assert viewer.page.inner_text(f"[name=size] [value='{value}']") == share
-    whole = viewer.camera
-    viewer.page.select_option("[name=size]", value)
-    viewer.settled("octree")
-    for side in ("w", "h"):
-        assert abs(viewer.camera[side] - float(value) * whole[side]) <= 0.5  # whole pixels
 
 
 @pytest.mark.parametrize(
@@ -299,6 +276,7 @@ def test_a_control_is_pressed_by_keyboard_after_a_click_on_the_picture(viewer: V
     viewer.page.focus("[name=shadows]")
     viewer.page.keyboard.press("Space")
     assert not viewer.page.is_checked("[name=shadows]")
+    assert viewer.page.evaluate("() => document.activeElement.name") == "shadows"
 
 
 def test_two_clicks_on_the_card_turn_about_nothing(viewer: Viewer) -> None:
@@ -314,10 +292,13 @@ def test_a_ray_is_seen_from_the_side_beside_its_card(viewer: Viewer) -> None:
     viewer.page.click("#card >> text=View from the side")
     card, frame = (viewer.page.locator(name).bounding_box() for name in ("#card", "#frame"))
     left, right = card["x"] + card["width"], frame["x"] + frame["width"]
-    start, end = viewer.page.evaluate("() => [viewer.rays.pick.path[0].start, viewer.rays.pick.path[0].end]")
-    seen = [place(viewer, point)[0] for point in (start, end)]
-    assert left < min(seen) < max(seen) < right and frame["x"] < left
-    middle = place(viewer, ((np.array(start) + end) / 2).tolist())
+    start, end = np.array(viewer.page.evaluate("() => [viewer.rays.pick.path[0].start, viewer.rays.pick.path[0].end]"))
+    x, y = zip(*(place(viewer, point.tolist()) for point in (start, end)), strict=True)
+    assert left < min(x) < max(x) < right and frame["x"] < left
+    assert frame["y"] < min(y) and max(y) < frame["y"] + frame["height"]
+    back = viewer.camera["m"][8:11]
+    assert abs((end - start) @ back) < 0.3 * math.dist(start, end)  # across the view, but for the tilt
+    middle = place(viewer, ((start + end) / 2).tolist())
     assert middle[0] == pytest.approx((left + right) / 2)
 
 
@@ -330,52 +311,10 @@ def test_the_divider_goes_to_its_ends(viewer: Viewer) -> None:
     viewer.page.evaluate("() => viewer.proof.move(0.5)")
 
 
-LUMINANCE = """() => {
-    const linear = (c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
-    const of = (element) => {
-        const [r, g, b] = getComputedStyle(element).backgroundColor.match(/[\\d.]+/g).map((c) => linear(c / 255));
-        return 0.2126 * r + 0.7152 * g + 0.0722 * b;
-    };
-    return [of(document.querySelector("[name=walk]")), of(document.querySelector("#panel"))];
-}"""
-
-
-@pytest.mark.parametrize("scheme", ["dark", "light"])
-def test_a_switch_that_is_off_stands_out(browser: Any, url: str, scheme: str) -> None:
-    page = Viewer(browser, url, color_scheme=scheme)
-    try:
-        page.page.goto(page.url)
-        off, ground = page.page.evaluate(LUMINANCE)
-        # WCAG 2.2, 1.4.11: 3 to 1 for what is needed to understand a control; its knob is white.
-        assert (max(off, ground) + 0.05) / (min(off, ground) + 0.05) >= 3.0
-        assert 1.05 / (off + 0.05) >= 3.0
-    finally:
-        page.context.close()
-
-
-@pytest.mark.parametrize(("width", "height"), [(320, 640), (390, 844)])
-def test_a_phone_shows_the_modes_whole_and_the_cameras_buttons_at_once(
-    browser: Any, url: str, width: int, height: int
-) -> None:
-    page = Viewer(browser, url, viewport={"width": width, "height": height}, has_touch=True, is_mobile=True)
-    try:
-        page.open()
-        assert page.page.evaluate("() => document.documentElement.scrollWidth") == width
-        cut = """() => [...document.querySelectorAll(".modes span")].filter((span) =>
-            span.scrollWidth > span.clientWidth || span.getBoundingClientRect().right > innerWidth).length"""
-        assert page.page.evaluate(cut) == 0
-        for button in ("#reset-view", "#fit", "#save-picture"):
-            box = page.page.locator(button).bounding_box()
-            assert box["y"] + box["height"] <= height, button
-    finally:
-        page.context.close()
-
-
 def test_settings_on_a_phone_are_folded_and_come_into_view(browser: Any, url: str) -> None:
     """They were open below the window, and the first touch hid them."""
     size = {"width": 390, "height": 844}
-    page = Viewer(browser, url, folded=True, viewport=size, has_touch=True, is_mobile=True)
-    try:
+    with Viewer(browser, url, folded=True, viewport=size, has_touch=True, is_mobile=True) as page:
         page.open()
         assert page.page.is_hidden("#panel")
         page.page.tap("#frame")
@@ -383,5 +322,3 @@ def test_settings_on_a_phone_are_folded_and_come_into_view(browser: Any, url: st
         page.page.tap("#toggle-panel")
         page.page.wait_for_function("() => document.querySelector('#panel').getBoundingClientRect().top < 400")
         assert page.page.is_visible("#fold-scene > summary")
-    finally:
-        page.context.close()

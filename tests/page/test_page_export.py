@@ -3,19 +3,10 @@
 from pathlib import Path
 
 import numpy as np
-import pytest
-from viewer_page import CHROMIUM, Viewer
+from viewer_client import decoded, frames, seen_by
+from viewer_page import Viewer
 
-pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
-pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
-
-
-from viewer_client import decoded, frames
-
-from renderer import load_scene, render
-from renderer.viewer.viewpoint import camera_of
-
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
+from renderer import load_scene
 
 
 def shared(viewer: Viewer) -> None:
@@ -32,8 +23,7 @@ def test_the_page_saves_a_still(viewer: Viewer, scenes: Path, tmp_path: Path) ->
         assert viewer.page.is_disabled("#export-still") and viewer.page.is_disabled("#export-turntable")
     assert download.value.suggested_filename == "blocks-1920x1080.png"
     download.value.save_as(tmp_path / "still.png")
-    seen = camera_of(viewer.camera["m"], viewer.camera["fovy"])
-    expected = render(load_scene(scenes / "blocks.toml"), camera=seen, resolution=(1920, 1080)).srgb
+    expected = seen_by(viewer.camera, load_scene(scenes / "blocks.toml"), resolution=(1920, 1080)).srgb
     assert np.array_equal(decoded((tmp_path / "still.png").read_bytes()), expected)
     viewer.page.wait_for_selector("#exporting", state="hidden")
     assert viewer.page.is_enabled("#export-still")

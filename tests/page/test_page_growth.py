@@ -4,32 +4,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
-from viewer_page import CHROMIUM, Viewer
+from viewer_client import seen_by
+from viewer_page import Viewer
 
-pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
-pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
-
-
-import renderer
 from renderer import load_scene
-from renderer.picture.image import srgb
-
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
 
 
 def test_the_page_grows_its_picture_and_says_so(browser: Any, url: str, scenes: Path) -> None:
-    page = Viewer(browser, url, refine=True).open()
-    page.page.wait_for_function(
-        "() => document.querySelector('#hud').textContent.startsWith('16 samples a pixel, within')"
-    )
-    shown = page.camera
-    from renderer.viewer.viewpoint import camera_of
-
-    seen = load_scene(scenes / "blocks.toml").model_copy(update={"camera": camera_of(shown["m"], shown["fovy"])})
-    expected = renderer.render(seen, resolution=(shown["w"], shown["h"]), samples=16)
-    assert np.array_equal(page.pixels("picture")[..., :3], srgb(expected.radiance))
-    page.context.close()
+    with Viewer(browser, url, refine=True).open() as page:
+        page.page.wait_for_function(
+            "() => document.querySelector('#hud').textContent.startsWith('16 samples a pixel, within')"
+        )
+        expected = seen_by(page.camera, load_scene(scenes / "blocks.toml"), samples=16)
+        assert np.array_equal(page.pixels("picture")[..., :3], expected.srgb)
 
 
 def test_what_is_copied_and_saved_has_the_samples_of_the_picture_that_is_seen(viewer: Viewer) -> None:

@@ -2,13 +2,7 @@
 
 from typing import Any
 
-import pytest
-from viewer_page import CHROMIUM, Viewer
-
-pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
-pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
-
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
+from viewer_page import Viewer
 
 _DRAGS = 12
 _LOOKS = 5
@@ -33,8 +27,7 @@ def test_drags_and_clicks_leave_nothing_behind(browser: Any, url: str) -> None:
     """A page that kept one picture a drag, would hold twelve pictures more; what
     the engine itself notes of code that it has seen often is far below one picture.
     """
-    page = Viewer(browser, url, viewport={"width": _WIDTH, "height": _HEIGHT}, folded=True).open()
-    try:
+    with Viewer(browser, url, viewport={"width": _WIDTH, "height": _HEIGHT}, folded=True).open() as page:
         connection = page.context.new_cdp_session(page.page)
         connection.send("HeapProfiler.enable")
 
@@ -48,6 +41,4 @@ def test_drags_and_clicks_leave_nothing_behind(browser: Any, url: str) -> None:
         drags()
         before, after = drags(), drags()
         width, height = page.page.evaluate("() => [viewer.shown.w, viewer.shown.h]")
-    finally:
-        page.context.close()
     assert after - before < 4 * width * height

@@ -6,20 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from viewer_page import CHROMIUM, Viewer
-
-pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
-pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
-
-
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
+from viewer_page import Viewer
 
 
 @pytest.fixture(scope="module")
 def page(browser: Any, url: str) -> Iterator[Viewer]:
-    page = Viewer(browser, url, viewport={"width": 900, "height": 560}).open()
-    yield page
-    page.context.close()
+    with Viewer(browser, url, viewport={"width": 900, "height": 560}).open() as page:
+        yield page
 
 
 def kept(page: Viewer) -> tuple[NDArray[np.uint8], dict[str, Any]]:

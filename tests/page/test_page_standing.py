@@ -7,12 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image as Pillow
-from viewer_page import CHROMIUM, MODELS, Viewer, served
-
-pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
-pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
-
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
+from viewer_page import MODELS, Viewer, served
 
 # The server sends a next picture once the last is acknowledged: so long as the page does not, it stays at that pass.
 HOLD = """() => {
@@ -42,9 +37,8 @@ STALE = 600
 @pytest.fixture
 def odd(browser: Any, url: str) -> Any:
     """A page whose stage has no shape that smaller pictures share to the pixel."""
-    page = Viewer(browser, url, viewport={"width": 823, "height": 467}).open()
-    yield page
-    page.context.close()
+    with Viewer(browser, url, viewport={"width": 823, "height": 467}).open() as page:
+        yield page
 
 
 def test_the_first_traced_picture_stands_until_a_finer_one_comes(odd: Viewer) -> None:
@@ -61,19 +55,6 @@ def test_the_first_traced_picture_stands_until_a_finer_one_comes(odd: Viewer) ->
     odd.settled("octree")
     drawn = odd.page.evaluate(WATCHED)
     assert drawn[0] == 128 and drawn[-1] == width and None not in drawn and drawn == sorted(drawn)
-
-
-@pytest.mark.parametrize("samples", ["4", "1"])
-def test_a_finished_picture_stands_until_one_of_other_samples_is_finished(odd: Viewer, samples: str) -> None:
-    width = odd.camera["w"]
-    if samples == "1":
-        odd.page.select_option("[name=samples]", "4")
-        odd.settled("octree")
-    odd.page.evaluate(WATCH)
-    odd.page.select_option("[name=samples]", samples)
-    odd.settled("octree")
-    odd.page.evaluate("() => viewer.draw()")
-    assert set(odd.page.evaluate(WATCHED)) == {width}
 
 
 def test_brute_force_begins_with_the_octrees_picture(odd: Viewer) -> None:
@@ -172,17 +153,6 @@ def test_a_picture_that_is_not_finished_is_saved_when_it_is(odd: Viewer, tmp_pat
     assert f"blocks.png, {seen.shape[1]} × {seen.shape[0]}" in said and "when it is finished" not in said
 
 
-def test_the_line_over_the_picture_says_that_it_is_not_the_last(odd: Viewer) -> None:
-    odd.page.evaluate(HOLD)
-    odd.page.evaluate("() => { viewer.camera.orbit(0.4, 0); viewer.moved(); }")
-    odd.page.wait_for_function("() => window.acks.some(({ seq, step }) => seq === viewer.seq && step === 0)")
-    width, height = (odd.page.evaluate("() => viewer.size")[k] for k in ("w", "h"))
-    odd.page.wait_for_function(f"() => document.querySelector('#hud').textContent.includes('of {width} × {height}')")
-    odd.page.evaluate(GO_ON)
-    odd.settled("octree")
-    assert odd.page.inner_text("#hud").startswith(f"{width} × {height} ·")
-
-
 # Each drawing, as it is seen: by which of the cameras that the page had, whether traced, how wide, and which answer.
 RECORD = """() => {
     const { viewer } = window;
@@ -211,30 +181,30 @@ LATE = """(late) => {
 }"""
 
 
-@pytest.mark.parametrize(("pause", "late"), [(4, 0), (120, 0), (30, STALE)])
+@pytest.mark.parametrize(("pause", "late"), [(4, 0), (30, STALE)])
 def test_no_frame_of_a_drag_is_older_or_coarser_than_one_before(browser: Any, pause: int, late: int) -> None:
     """At the default size, by a drag of twenty movements with so many milliseconds between; of so many samples that the
     last picture takes longer than a picture of another camera may stand.
     """
-    with served(MODELS.parent / "three_models.toml") as address:
-        page = Viewer(browser, address, viewport={"width": 1280, "height": 800}, folded=True).open()
-        try:
-            page.page.evaluate("() => (viewer.panel.fields.samples.value = '9')")
-            page.page.evaluate(RECORD)
-            if late:
-                page.page.evaluate(LATE, late)
-            x, y = page.centre()
-            page.page.mouse.move(x, y)
-            page.page.mouse.down()
-            for step in range(1, 21):
-                page.page.mouse.move(x + 10 * step, y + 4 * step)
-                page.page.wait_for_timeout(pause)
-            page.page.mouse.up()
-            page.page.wait_for_timeout(50)
-            page.settled("octree")
-            frames = page.page.evaluate("() => window.frames_seen")
-        finally:
-            page.context.close()
+    size = {"width": 1280, "height": 800}
+    with (
+        served(MODELS.parent / "three_models.toml") as address,
+        Viewer(browser, address, viewport=size, folded=True).open() as page,
+    ):
+        page.page.evaluate("() => (viewer.panel.fields.samples.value = '9')")
+        page.page.evaluate(RECORD)
+        if late:
+            page.page.evaluate(LATE, late)
+        x, y = page.centre()
+        page.page.mouse.move(x, y)
+        page.page.mouse.down()
+        for step in range(1, 21):
+            page.page.mouse.move(x + 10 * step, y + 4 * step)
+            page.page.wait_for_timeout(pause)
+        page.page.mouse.up()
+        page.page.wait_for_timeout(50)
+        page.settled("octree")
+        frames = page.page.evaluate("() => window.frames_seen")
     assert len(frames) > 5 and frames[-1]["traced"] and frames[-1]["camera"] == frames[-1]["now"]
     for before, after in pairwise(frames):
         assert after["camera"] >= before["camera"], (before, after)

@@ -9,17 +9,11 @@ from urllib.parse import parse_qs, urlencode
 import numpy as np
 import pytest
 from cases import cases
-from viewer_page import CHROMIUM, MODELS, SCENE, Viewer, served
+from viewer_client import seen_by
+from viewer_page import MODELS, SCENE, Viewer, served
 
-from renderer import Mirror, Phong, PointLight, load_scene, render
-from renderer.picture.image import srgb
+from renderer import Mirror, Phong, PointLight, load_scene
 from renderer.scene.hide import without
-from renderer.viewer.viewpoint import camera_of
-
-pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
-pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
-
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
 
 RED = "#materials details[data-name=red]"
 
@@ -30,16 +24,10 @@ def settled(viewer: Viewer, mode: str = "octree") -> None:
     viewer.settled(mode)
 
 
-def expected(viewer: Viewer, scene: Any) -> Any:
-    """The command line's picture for what the page shows."""
-    shown = viewer.camera
-    camera = camera_of(shown["m"], shown["fovy"], height=shown.get("height"))
-    size, depth = (shown["w"], shown["h"]), int(viewer.page.input_value("[name=max_depth]"))
-    return srgb(render(scene.model_copy(update={"camera": camera}), resolution=size, max_depth=depth).radiance)
-
-
 def shows(viewer: Viewer, scene: Any) -> None:
-    np.testing.assert_array_equal(viewer.pixels("picture")[..., :3], expected(viewer, scene))
+    """The command line's picture for the page's camera and bounces."""
+    expected = seen_by(viewer.camera, scene, max_depth=int(viewer.page.input_value("[name=max_depth]")))
+    np.testing.assert_array_equal(viewer.pixels("picture")[..., :3], expected.srgb)
 
 
 def unfold(viewer: Viewer, entry: str) -> None:
@@ -257,8 +245,7 @@ def address(viewer: Viewer) -> str:
 
 
 def test_the_address_brings_the_view_back(browser: Any, url: str, scenes: Path) -> None:
-    one = Viewer(browser, url).open()
-    try:
+    with Viewer(browser, url).open() as one:
         one.drag(50, 20)
         one.page.select_option("[name=samples]", "4")
         one.page.click("[name=shadows]")
@@ -270,10 +257,7 @@ def test_the_address_brings_the_view_back(browser: Any, url: str, scenes: Path) 
         one.page.wait_for_function("(id) => viewer.scene.id !== id", arg=before)
         settled(one)
         link, camera, picture = address(one), one.camera, one.pixels("picture")
-    finally:
-        one.context.close()
-    two = Viewer(browser, link)
-    try:
+    with Viewer(browser, link) as two:
         two.page.goto(link)
         two.page.wait_for_function("() => window.viewer?.objects.hidden.length === 1")
         settled(two)
@@ -289,8 +273,6 @@ def test_the_address_brings_the_view_back(browser: Any, url: str, scenes: Path) 
         two.page.reload()
         two.shows("other.toml")
         two.settled("phong")
-    finally:
-        two.context.close()
 
 
 def told(viewer: Viewer) -> dict[str, list[str]]:
@@ -376,8 +358,7 @@ WRONG = [
 
 @cases("wrong", WRONG)
 def test_what_is_no_view_in_an_address_is_left_out(browser: Any, url: str, scenes: Path, wrong: dict[str, str]) -> None:
-    page = Viewer(browser, url)
-    try:
+    with Viewer(browser, url) as page:
         page.page.goto(f"{url}#{urlencode(wrong)}")
         page.page.wait_for_selector("body[data-ready]")
         page.settled("octree")
@@ -385,45 +366,38 @@ def test_what_is_no_view_in_an_address_is_left_out(browser: Any, url: str, scene
         np.testing.assert_allclose(page.camera["m"][12:15], (0.5, 2.6, 5.5), rtol=1e-9)
         assert page.page.evaluate("() => viewer.panel.settings.edits ?? null") is None
         assert page.page.locator("#notices p").count() == 0
-    finally:
-        page.context.close()
 
 
 def test_a_scene_is_saved_after_its_diff_was_seen(browser: Any, tmp_path: Path) -> None:
     file = tmp_path / "blocks.toml"
     file.write_text(f"# by hand\n{SCENE}")
-    with served(file) as address:
-        page = Viewer(browser, address).open()
-        try:
-            page.page.click("#save-scene")
-            page.page.wait_for_selector("#changes[open]")
-            assert "Nothing" in page.page.inner_text("#changes pre") and page.page.is_disabled("#save-changes")
-            page.page.keyboard.press("3")  # which is no shortcut here
-            page.page.click("#close-changes")
-            unfold(page, RED)
-            page.page.locator(f"{RED} [aria-label='diffuse, green']").fill("0.5")
-            page.page.click("#save-scene")
-            page.page.wait_for_selector("#changes .added")
-            assert page.page.locator("#changes .added").all_inner_texts() == ["+diffuse = [0.7, 0.5, 0.1]\n"]
-            assert page.page.locator("#changes .removed").all_inner_texts() == ["-diffuse = [0.7, 0.1, 0.1]\n"]
-            with page.page.expect_download() as download:
-                page.page.click("#save-changes")
-            assert download.value.suggested_filename == "blocks.toml"
-            text = Path(download.value.path()).read_text()
-            assert text == file.read_text().replace("[0.7, 0.1, 0.1]", "[0.7, 0.5, 0.1]")
-            assert page.page.evaluate("() => viewer.mode") == "octree"
-            # In the place of the file it is what the page shows, and nothing is changed any more.
-            file.write_text(text)
-            page.page.wait_for_function("() => viewer.scene.materials[0].fields.diffuse[1] === 0.5")
-            settled(page)
-            assert page.page.evaluate("() => viewer.panel.settings.edits ?? null") is None
-        finally:
-            page.context.close()
+    with served(file) as address, Viewer(browser, address).open() as page:
+        page.page.click("#save-scene")
+        page.page.wait_for_selector("#changes[open]")
+        assert "Nothing" in page.page.inner_text("#changes pre") and page.page.is_disabled("#save-changes")
+        page.page.keyboard.press("3")  # which is no shortcut here
+        page.page.click("#close-changes")
+        unfold(page, RED)
+        page.page.locator(f"{RED} [aria-label='diffuse, green']").fill("0.5")
+        page.page.click("#save-scene")
+        page.page.wait_for_selector("#changes .added")
+        assert page.page.locator("#changes .added").all_inner_texts() == ["+diffuse = [0.7, 0.5, 0.1]\n"]
+        assert page.page.locator("#changes .removed").all_inner_texts() == ["-diffuse = [0.7, 0.1, 0.1]\n"]
+        with page.page.expect_download() as download:
+            page.page.click("#save-changes")
+        assert download.value.suggested_filename == "blocks.toml"
+        text = Path(download.value.path()).read_text()
+        assert text == file.read_text().replace("[0.7, 0.1, 0.1]", "[0.7, 0.5, 0.1]")
+        assert page.page.evaluate("() => viewer.mode") == "octree"
+        # In the place of the file it is what the page shows, and nothing is changed any more.
+        file.write_text(text)
+        page.page.wait_for_function("() => viewer.scene.materials[0].fields.diffuse[1] === 0.5")
+        settled(page)
+        assert page.page.evaluate("() => viewer.panel.settings.edits ?? null") is None
 
 
 def test_everything_is_folded_at_first_and_as_it_was_left_later(browser: Any, url: str) -> None:
-    page = Viewer(browser, url, folded=True, viewport={"width": 1280, "height": 800})
-    try:
+    with Viewer(browser, url, folded=True, viewport={"width": 1280, "height": 800}) as page:
         page.open()
         assert page.page.locator("aside details[open]").count() == 0 and page.page.is_visible("#panel")
         page.page.click("#fold-octree > summary")
@@ -434,33 +408,23 @@ def test_everything_is_folded_at_first_and_as_it_was_left_later(browser: Any, ur
         page.page.wait_for_selector("body[data-ready]")
         assert page.page.is_hidden("#panel") and page.page.locator("aside details[open]").count() == 1
         page.page.set_viewport_size({"width": 900, "height": 700})
-    finally:
-        page.context.close()
-    narrow = Viewer(browser, url, folded=True, viewport={"width": 900, "height": 700})
-    try:
+    with Viewer(browser, url, folded=True, viewport={"width": 900, "height": 700}) as narrow:
         narrow.open()
         assert narrow.page.is_hidden("#panel")
         assert narrow.page.get_attribute("#toggle-panel", "aria-expanded") == "false"
         assert narrow.page.locator("#frame").bounding_box()["width"] == 900
-    finally:
-        narrow.context.close()
 
 
 def test_a_scene_has_its_name_and_a_mesh_that_of_its_file(browser: Any) -> None:
     """It was Block.Ply."""
-    with served(MODELS / "block.ply") as url:
-        page = Viewer(browser, url)
-        try:
-            page.page.goto(url)
-            page.page.wait_for_selector("body[data-ready]")
-            assert page.page.inner_text("#name") == "block.ply"
-        finally:
-            page.context.close()
+    with served(MODELS / "block.ply") as url, Viewer(browser, url) as page:
+        page.page.goto(url)
+        page.page.wait_for_selector("body[data-ready]")
+        assert page.page.inner_text("#name") == "block.ply"
 
 
 def test_the_hint_goes_with_the_first_click(browser: Any, url: str) -> None:
-    page = Viewer(browser, url, folded=True).open()
-    try:
+    with Viewer(browser, url, folded=True).open() as page:
         assert page.page.is_visible("#hint")
         page.page.mouse.click(*page.centre())
         page.page.wait_for_selector("#card:not([hidden])")
@@ -468,5 +432,3 @@ def test_the_hint_goes_with_the_first_click(browser: Any, url: str) -> None:
         page.page.reload()
         page.page.wait_for_selector("body[data-ready]")
         assert page.page.is_hidden("#hint")
-    finally:
-        page.context.close()

@@ -85,7 +85,7 @@ def test_the_console_scripts_look_into_no_folder(folder):
         assert done.returncode == 0 and done.stdout.startswith(f"usage: {name}") and executed(folder) == ""
 
 
-@pytest.mark.parametrize("path", ["", ".", ":", "relative", "{folder}/../trapped/.."])
+@pytest.mark.parametrize("path", [":", "relative", "{folder}/../trapped/.."])
 def test_a_child_has_the_packages_of_its_parent_and_no_relative_path(folder, path):
     script = f"""
 import subprocess, sys
@@ -115,12 +115,3 @@ def test_a_child_that_fails_is_said_with_its_last_words(monkeypatch, caplog):
     assert record.levelname == "WARNING"
     told = "renderer: the process that compiles beside this one ended with exit code 1: OSError: no room"
     assert record.getMessage() == told
-
-
-def test_a_child_that_succeeds_is_not_mentioned(monkeypatch, caplog):
-    monkeypatch.setattr(precompile, "is_on_disk", lambda kernel: False)
-    monkeypatch.setattr(precompile, "available_threads", lambda: 2)
-    monkeypatch.setattr(precompile, "_build", lambda: None)
-    monkeypatch.setattr(child, "command", lambda *arguments: [sys.executable, "-P", "-c", "print('fine')"])
-    precompile.compile_in_two()
-    assert not caplog.records

@@ -132,7 +132,7 @@ SIZES: list[tuple[str, str, int, Callable[[], list[Any]]]] = [
     ("octree", "_ROWS", 7, too_small),
     ("mesh.polygons", "_BLOCK_CORNERS", 12, polygons),
     ("picture.touching", "_CHUNK", 1, lambda: [crowded().touching]),
-    ("inspect.face_phong", "_CHUNK", 7, lambda: [face_colors(crowded().arrays, (0.0, 2.0, 9.0))]),
+    ("diagnostics.face_phong", "_CHUNK", 7, lambda: [face_colors(crowded().arrays, (0.0, 2.0, 9.0))]),
     ("trimesh_ray.facing", "_TOGETHER", 3, nearest_of_trimesh),
     ("studies.views", "_ROWS", 7, lambda: [visible_faces(TREES[0], (0.0, 2.0, 3.0))]),
 ]  # fmt: skip

@@ -13,12 +13,9 @@ import pytest
 from cases import cases
 
 from renderer import load_scene, render
-from renderer.cli import main as cli
+from renderer.cli import render as rendering
 from renderer.cli.main import main
-from renderer.mesh.load import save_ply
-from renderer.mesh.shapes import icosphere
 from renderer.picture.image import PLANES, Image
-from renderer.scene.scene import write_scene
 from renderer.system import files
 from renderer.system.files import are_apart, check_writable, write_atomically
 
@@ -48,21 +45,6 @@ def test_files_are_apart_unless_links_lead_to_one(tmp_path: Path) -> None:
     assert are_apart([a, b, loop]) and are_apart([a], [b, b, loop]) and are_apart([])
     assert not are_apart([a, f"{tmp_path}/./a"]) and not are_apart([a, link])
     assert not are_apart([b, a], [link]) and not are_apart([loop], [loop])
-
-
-def test_a_symbolic_link_is_followed(tmp_path: Path) -> None:
-    (tmp_path / "there").mkdir()
-    target, link = tmp_path / "there" / "a.bin", tmp_path / "link.bin"
-    target.write_bytes(b"old")
-    link.symlink_to(target)
-    write_atomically(link, lambda file: file.write(b"new"))
-    assert link.is_symlink()
-    assert target.read_bytes() == b"new"
-    assert sorted(p.name for p in tmp_path.rglob("*")) == ["a.bin", "link.bin", "there"]
-    # One that leads nowhere yet, too.
-    (tmp_path / "other").symlink_to(tmp_path / "there" / "b.bin")
-    write_atomically(tmp_path / "other", lambda file: file.write(b"b"))
-    assert (tmp_path / "there" / "b.bin").read_bytes() == b"b"
 
 
 _WRITER = """
@@ -144,24 +126,6 @@ def test_without_locks_files_are_written_and_nothing_is_found_left(
     assert left.exists() and (tmp_path / "a.bin").read_bytes() == b"new"
 
 
-@pytest.mark.parametrize("failing", ["write", "replace"])
-def test_an_error_names_the_file_and_leaves_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: str
-) -> None:
-    path = tmp_path / "a.bin"
-    path.write_bytes(b"old")
-
-    def refuse(*arguments: Any) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    if failing == "replace":
-        monkeypatch.setattr(files.os, "replace", refuse)
-    with pytest.raises(OSError, match="No space left on device") as told:
-        write_atomically(path, refuse if failing == "write" else lambda file: file.write(b"new"))
-    assert told.value.filename == str(path)
-    assert [p.read_bytes() for p in tmp_path.iterdir()] == [b"old"]
-
-
 def test_whether_a_folder_can_be_written_is_found_out_before_the_work(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
 ) -> None:
@@ -171,21 +135,12 @@ def test_whether_a_folder_can_be_written_is_found_out_before_the_work(
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
     monkeypatch.setattr(files.Path, "touch", refuse)
-    monkeypatch.setattr(cli, "_save", lambda *a: pytest.fail("rendered in vain"))
+    monkeypatch.setattr(rendering, "_save", lambda *a: pytest.fail("rendered in vain"))
     with pytest.raises(PermissionError, match="Permission denied"):
         check_writable(tmp_path / "a.png")
     assert main(["render", str(STAIRS), "-o", str(tmp_path / "a.png"), "--resolution", "8x8"]) == 2
     assert capsys.readouterr().err == f"octree-render: [Errno 13] Permission denied: '{tmp_path / 'a.png'}'\n"
     assert not list(tmp_path.iterdir())
-
-
-def test_asking_leaves_nothing_and_changes_nothing(tmp_path: Path) -> None:
-    path = tmp_path / "a.png"
-    check_writable(path)
-    assert not list(tmp_path.iterdir())
-    path.write_bytes(b"old")
-    check_writable(path)
-    assert path.read_bytes() == b"old"
 
 
 def test_a_picture_that_cannot_be_written_is_kept_elsewhere(
@@ -211,31 +166,6 @@ def test_a_picture_that_cannot_be_written_is_kept_elsewhere(
     np.testing.assert_array_equal(np.load(kept), render(load_scene(STAIRS), resolution=(8, 8)).radiance)
 
 
-def test_a_picture_that_no_memory_is_left_to_encode_is_kept_as_radiance(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
-) -> None:
-    def write_png(*_: object) -> None:
-        raise MemoryError
-
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    monkeypatch.setattr(Image, "_write_png", write_png)
-    assert main(["render", str(STAIRS), "-o", str(tmp_path / "a.png"), "--resolution", "8x8", "--quiet"]) == 2
-    (kept,) = tmp_path.rglob("a.npy")
-    said = capsys.readouterr().err
-    assert said == (f"octree-render: there is not enough memory to encode the picture; the picture is kept as {kept}\n")
-    np.testing.assert_array_equal(np.load(kept), render(load_scene(STAIRS), resolution=(8, 8)).radiance)
-    assert not (tmp_path / "a.png").exists()
-
-
-def test_no_memory_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
-    def load(*_: object) -> None:
-        raise MemoryError
-
-    monkeypatch.setattr("renderer.scene.scene.load_scene", load)
-    assert main(["info", str(STAIRS)]) == 2
-    assert capsys.readouterr().err == "octree-render: not enough memory\n"
-
-
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no full device")
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 def test_a_full_standard_output_is_named(unbuffered: str) -> None:
@@ -259,16 +189,6 @@ def test_an_array_on_a_full_disk_is_named_with_the_likely_reason(tmp_path: Path)
         OSError, match=re.escape(f"{tmp_path / 'a.npy'}: 1228800 requested and 262112 written; is there")
     ):
         write_atomically(tmp_path / "a.npy", write)
-
-
-@pytest.mark.skipif(os.name != "posix", reason="other systems keep the current folder")
-def test_a_relative_path_in_a_folder_that_was_removed_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    gone = tmp_path / "gone"
-    gone.mkdir()
-    monkeypatch.chdir(gone)
-    gone.rmdir()
-    with pytest.raises(FileNotFoundError, match=re.escape("'the folder of a.png'")):
-        check_writable("a.png")
 
 
 @pytest.mark.judges("Image", "render")
@@ -327,14 +247,6 @@ def test_a_device_without_an_end_is_refused(tmp_path: Path, name: str) -> None:
         load_scene(tmp_path / name)
 
 
-@cases("name", ["a\x1bb.ply", "a\nb.ply", "a\x7fb.ply", 'a"b.ply'])
-def test_a_bare_mesh_of_any_name_is_shown(tmp_path: Path, name: str) -> None:
-    save_ply(icosphere(1), tmp_path / name)
-    assert load_scene(tmp_path / name).instances
-    write_scene(tmp_path / name, tmp_path / "it.toml")
-    assert load_scene(tmp_path / "it.toml").instances
-
-
 def test_an_error_tells_a_terminal_nothing(tmp_path: Path, capsys: Any) -> None:
     (tmp_path / "a.ply").write_bytes(
         b"ply\nformat ascii 1.0\nelement vert\x1b]0;PWN\x07ex 1\nproperty float x\nend_header\n"
@@ -345,24 +257,9 @@ def test_an_error_tells_a_terminal_nothing(tmp_path: Path, capsys: Any) -> None:
     assert said.rstrip("\n").isprintable()
 
 
-def test_numpys_own_words_of_a_full_disk_get_the_path(tmp_path: Path) -> None:
-    def short(file: Any) -> None:
-        raise OSError("786432 requested and 4064 written")
-
-    with pytest.raises(OSError, match=r"a\.npy: 786432 requested and 4064 written"):
-        write_atomically(tmp_path / "a.npy", short)
-
-
 def test_a_private_file_is_private_while_it_is_written(tmp_path: Path) -> None:
     path, modes = tmp_path / "private.bin", []
     path.touch()
     path.chmod(0o600)
     write_atomically(path, lambda file: modes.append(os.fstat(file.fileno()).st_mode & 0o777))
     assert modes == [0o600]
-
-
-def test_a_name_that_no_file_can_have_is_refused_with_its_argument(tmp_path: Path) -> None:
-    path = tmp_path / "\ud800.png"
-    for ask in (lambda: render(load_scene(STAIRS), resolution=(2, 2)).save(path), lambda: load_scene(path)):
-        with pytest.raises(ValueError, match=r"\ud800\.png: path: expected a path that .* can spell"):
-            ask()

@@ -32,38 +32,6 @@ def test_every_item_is_worked_on_once(count, size, threads):
     assert (times == 1).all() and sum(ends) == count and len(ends) == -(-count // size)
 
 
-def test_chunks_run_side_by_side():
-    together = threading.Barrier(3)
-
-    def work(begin, end):
-        together.wait(timeout=10)
-
-    for_chunks(work, 3, 1, 3)
-
-
-def test_one_thread_works_in_the_caller_and_in_order():
-    begins, names = [], set()
-
-    def work(begin, end):
-        begins.append(begin)
-        names.add(threading.current_thread())
-
-    for_chunks(work, 50, 3, 1)
-    assert begins == list(range(0, 50, 3)) and names == {threading.current_thread()}
-
-
-def test_finished_is_called_by_one_thread_at_a_time():
-    inside = [0]
-
-    def finished(items):
-        inside[0] += 1
-        time.sleep(0.0005)
-        assert inside[0] == 1
-        inside[0] -= 1
-
-    for_chunks(lambda begin, end: None, 40, 1, 5, finished)
-
-
 @cases("threads", [1, 2, 5])
 @cases("error", [ZeroDivisionError, KeyboardInterrupt, SystemExit])
 def test_an_exception_comes_out_and_stops_the_rest(error, threads):
@@ -85,23 +53,6 @@ def test_an_exception_comes_out_and_stops_the_rest(error, threads):
     # The pool lives on.
     for_chunks(lambda begin, end: done.append(begin), 20, 1, threads)
     assert len(done) == after + 20
-
-
-@pytest.mark.parametrize("threads", [1, 2, 5])
-def test_an_exception_in_finished_stops_the_rest(threads):
-    done = []
-
-    def work(begin, end):
-        time.sleep(0.001)
-        done.append(begin)
-
-    def finished(items):
-        if len(done) >= 10:
-            raise ZeroDivisionError("finished")
-
-    with pytest.raises(ZeroDivisionError, match="finished"):
-        for_chunks(work, 500, 1, threads, finished)
-    assert len(done) <= 10 + 2 * threads
 
 
 def test_an_exception_in_finished_of_one_thread_stops_the_others():
@@ -196,17 +147,6 @@ def test_long_work_tells_that_it_goes_on_and_may_be_stopped_there(threads):
     assert not ended
 
 
-def test_long_work_that_ends_is_told_like_any_other():
-    told = []
-
-    def work(begin, end):
-        yield
-        yield
-
-    for_chunks(work, 6, 2, 1, told.append)
-    assert told == [0, 0, 2] * 3
-
-
 def test_there_is_one_pool_however_many_threads_are_asked_for():
     def helpers():
         return sum(thread.name.startswith("renderer") for thread in threading.enumerate())
@@ -232,9 +172,7 @@ def late():
 """
 
 
-@pytest.mark.parametrize(
-    "how", ["threading.Thread(target=late).start()", "atexit.register(ask)", "ask(); atexit.register(ask)"]
-)
+@pytest.mark.parametrize("how", ["threading.Thread(target=late).start()", "ask(); atexit.register(ask)"])
 def test_queries_work_after_the_main_thread_has_ended(how):
     done = subprocess.run(
         [sys.executable, "-P", "-c", AFTER_THE_END.format(how=how)],

@@ -16,7 +16,7 @@ import pytest
 from cases import cases
 from meshes import answers, arrays, make_mesh, rays_at
 
-from renderer import BruteForce, Image, Mesh, Octree, Repairs, Scene, load_scene, render
+from renderer import BruteForce, Image, Octree, Scene, load_scene, render
 from renderer.mesh.load import save_ply
 from renderer.mesh.shapes import icosphere
 from renderer.scene.scene import write_scene
@@ -69,16 +69,6 @@ def asked(target: Octree | BruteForce) -> dict[str, bytes]:
 
 @by_any_way
 @any_target
-def test_a_copy_answers_every_query_with_the_same_bits(kind: str, way: str, tmp_path: Path) -> None:
-    target = TARGETS[kind](tmp_path)
-    expected = asked(target)
-    copied = WAYS[way](target)
-    assert asked(copied) == expected
-    assert type(copied) is type(target) and copied.threads == target.threads and copied.stats == target.stats
-
-
-@by_any_way
-@any_target
 def test_what_is_refitted_leaves_its_copies_alone(kind: str, way: str, tmp_path: Path) -> None:
     target = TARGETS[kind](tmp_path)
     expected, moved = asked(target), target.mesh.vertices * [0.5, 1.0, 2.0]
@@ -88,26 +78,6 @@ def test_what_is_refitted_leaves_its_copies_alone(kind: str, way: str, tmp_path:
     target.refit(moved)
     assert asked(target) == asked(copied) and asked(other) == expected
     assert kind == "no faces" or asked(target) != expected
-
-
-@by_any_way
-def test_repairs_go_with_an_octree(way: str) -> None:
-    octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, np.nan, 0]], [[0, 1, 3], [0, 1, 2]], repair=True)
-    for repairs in (WAYS[way](octree).repairs, WAYS[way](octree.repairs)):
-        assert (
-            isinstance(repairs, Repairs) and repairs.kept_faces.tolist() == [1] and str(repairs) == str(octree.repairs)
-        )
-
-
-@by_any_way
-def test_a_copied_mesh_is_the_same_mesh_to_an_octree(way: str) -> None:
-    ball = icosphere(3)
-    mesh = Mesh(ball.vertices, ball.faces, ball.vertices, abs(ball.vertices), ball.vertices[:, :2], "ball")
-    assert not mesh.is_float32 and not len(mesh.open_edges)  # kept once it was asked
-    copied = WAYS[way](mesh)
-    assert asked(Octree.from_mesh(copied)) == asked(Octree.from_mesh(mesh))
-    assert copied.vertex_normals().tobytes() == mesh.vertex_normals().tobytes()
-    assert all((a == b).all() for a, b in zip(copied.bounds, mesh.bounds, strict=True))
 
 
 # --- answers ----------------------------------------------------------------------------------------------------
@@ -157,16 +127,6 @@ def test_a_scene_travels_without_its_files(way: str, tmp_path: Path) -> None:
     copied = WAYS[way](scene)
     assert render(copied, resolution=(24, 16)).radiance.tobytes() == expected.tobytes()
     assert copied.render == scene.render and copied.materials == scene.materials and copied.camera == scene.camera
-
-
-@by_any_way
-def test_a_picture_travels_with_all_its_planes(way: str, tmp_path: Path) -> None:
-    image = render(from_file(tmp_path), resolution=(24, 16))
-    copied = WAYS[way](image)
-    assert isinstance(copied, Image) and vars(copied).keys() == vars(image).keys()
-    for name, value in vars(image).items():
-        assert np.asarray(getattr(copied, name)).tobytes() == np.asarray(value).tobytes()
-    assert copied._repr_png_() == image._repr_png_() and copied.cut_message(3) == image.cut_message(3)
 
 
 # --- other processes --------------------------------------------------------------------------------------------

@@ -102,22 +102,6 @@ def test_a_chunk_that_was_left_goes_on_after_other_rays_on_the_same_thread(slive
     assert len(calls) >= 4
 
 
-def test_visible_points_amid_slivers(slivers, monkeypatch):
-    origins, directions = rays_at_hair("stream")
-    calls = calls_of(monkeypatch, query, "trace_chunk")
-    slivers.visible(origins, origins + directions)
-    assert len(calls) >= 2
-
-
-def test_ordinary_rays_are_one_call_a_chunk(monkeypatch):
-    """Cut more finely, streams would lose speed."""
-    rng = np.random.default_rng(2)
-    octree, origins = Octree(*layers(300), threads=1), rng.normal(size=(16 * 8192, 3))
-    calls = calls_of(monkeypatch, query, "trace_chunk")
-    octree.closest_hit(origins, -origins)
-    assert len(calls) == 16
-
-
 def test_steps_amid_slivers(slivers, monkeypatch):
     def ask(*rays):
         counted = slivers.count_steps(*rays)

@@ -50,32 +50,6 @@ def test_distances_are_the_exact_ones() -> None:
             assert abs(Fraction(distance) ** 2 / square - 1) < Fraction(1, 2**50)
 
 
-def test_of_faces_at_an_edge_the_one_that_faces_the_point_is_named() -> None:
-    points = np.transpose([np.zeros(20), np.ones(20), np.linspace(-1, 1, 20)])
-    places, _, faces = closest_point(ACUTE, points)
-    np.testing.assert_array_equal(places, np.tile([0.0, 0.5, 0.0], (20, 1)))
-    # The edge's two faces, in halves.
-    assert len(set(faces[:10])) == len(set(faces[10:])) == 1 and set(faces) == {0, 2}
-    normals = ACUTE.face_normals[[0, 2]]
-    np.testing.assert_array_equal(faces, np.array([0, 2])[((points - places) @ normals.T).argmax(axis=1)])
-
-
-def test_of_faces_at_a_corner_too_and_between_them_the_face_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    mesh, rng = trimesh.creation.icosphere(subdivisions=1), np.random.default_rng(3)
-    corners = mesh.vertices * 2 + rng.uniform(-1e-3, 1e-3, mesh.vertices.shape)
-    inner = mesh.triangles_center * 2
-    points = np.concatenate([corners, inner])
-    expected = [
-        max(ring[ring >= 0], key=lambda face: mesh.face_normals[face] @ (points[i] - mesh.vertices[i]))
-        for i, ring in enumerate(mesh.vertex_faces)
-    ]
-    for together in (1 << 20, 1):  # all at once, and point by point
-        monkeypatch.setattr("renderer.trimesh_ray.facing._TOGETHER", together)
-        faces = closest_point(mesh, points)[2]
-        assert faces[: len(corners)].tolist() == expected
-        assert faces[len(corners) :].tolist() == list(range(len(mesh.faces)))
-
-
 @pytest.mark.parametrize("soup", [False, True])
 def test_the_face_named_has_its_front_to_points_outside_a_convex_body(soup: bool) -> None:
     """Corners are told apart by position: of soup the face that was found had its back to a third of the points."""
@@ -86,11 +60,6 @@ def test_the_face_named_has_its_front_to_points_outside_a_convex_body(soup: bool
     points = points[~mesh.contains(points)]
     places, _, faces = closest_point(mesh, points)
     assert (np.einsum("ij,ij->i", mesh.face_normals[faces], points - places) > -1e-12).all()
-
-
-def test_of_faces_at_one_place_the_one_turned_to_the_point_is_named() -> None:
-    mesh = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 1]], process=False)
-    assert closest_point(mesh, [[0.2, 0.2, 1], [0.2, 0.2, -1], [-1, 0, 1], [-1, 0, -1]])[2].tolist() == [0, 1, 0, 1]
 
 
 def test_the_sign_is_right_where_the_nearest_normal_is_not() -> None:
@@ -123,19 +92,6 @@ def test_thickness_and_reach_of_a_box(drop_in: None) -> None:
     np.testing.assert_allclose(by_rays, np.array([1, 2, 3])[along])
 
 
-def test_samples_of_the_surface_have_no_distance_to_it(drop_in: None) -> None:
-    mesh = trimesh.creation.torus(2, 0.5)
-    points = mesh.sample(500, seed=4)
-    assert np.abs(mesh.nearest.signed_distance(points)).max() < 1e-15
-
-
-def test_a_vertex_that_no_face_has_is_not_near() -> None:
-    mesh = trimesh.Trimesh([[1, 0, 0], [0, 1, 0], [0, 0, 1], [-0.5, -0.5, -0.5]], [[0, 1, 2]], process=False)
-    places, _, faces = closest_point(mesh, [[-1, -1, -1]])
-    np.testing.assert_allclose(places, [[1 / 3, 1 / 3, 1 / 3]])
-    assert faces.tolist() == [0]
-
-
 def test_voxels_by_rays_have_no_holes(drop_in: None) -> None:
     mesh = trimesh.creation.icosphere(subdivisions=4)
     voxels = trimesh.voxel.creation.voxelize_ray(mesh, 0.05)
@@ -153,14 +109,6 @@ def test_a_nearest_point_never_has_a_face_without_a_place() -> None:
     mesh = trimesh.Trimesh(vertices, [[0, 1, 3], [0, 1, 2]], process=False)
     _, distance, face = closest_point(mesh, [[0, 0.5, 2.0]])
     assert face.tolist() == [1] and np.isclose(distance, np.sqrt(2.0))
-
-
-def test_of_equally_aslant_faces_it_is_the_lowest() -> None:
-    corners, faces = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
-    points = [[0.5, 0.5, 1], [0.25, 0.25, 2], [0, 0, 1], [1, 1, 3]]
-    for order in (faces, faces[::-1]):
-        mesh = trimesh.Trimesh(corners, order, process=False)
-        assert closest_point(mesh, points)[2].tolist() == [0] * 4
 
 
 def test_at_slanted_edges_it_is_the_face_turned_to_the_point() -> None:

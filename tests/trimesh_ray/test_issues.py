@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from cases import cases
 
 from renderer.trimesh_ray import RayMeshIntersector, installed
 
@@ -32,23 +31,6 @@ def test_2504_a_tiny_box_seen_from_far_away_is_passed_twice() -> None:
     np.testing.assert_array_equal(places[:, 2], [5e-4, -5e-4])
 
 
-def test_2504_no_face_is_listed_twice_at_any_scale() -> None:
-    for scale in (1e-4, 0.1, 1.0, 10.0, 1e4, 1e8):
-        mesh = box().subdivide().subdivide()
-        mesh.apply_scale(scale)
-        mesh.ray = RayMeshIntersector(mesh, scale_to_box=False)
-        faces, _ = mesh.ray.intersects_id([[0, 0, scale / 2]], [[0, 0, -1]], multiple_hits=True)
-        assert len(faces) == 2, scale
-
-
-def test_2324_a_mesh_that_was_scaled_is_still_hit() -> None:
-    mesh = box(64, 64, 64)
-    mesh.ray.intersects_any([[0, 0, 99]], [[0, 0, -1]])
-    mesh.apply_scale(1 / 64)
-    places, rays, _ = mesh.ray.intersects_location([[0.5, 0.5, -2]], [[0, 0, 1]], multiple_hits=False)
-    assert rays.tolist() == [0] and places.tolist() == [[0.5, 0.5, -0.5]]
-
-
 def test_1496_any_and_id_agree_at_corners_and_edges() -> None:
     inner, outer = box(40, 40, 40).subdivide_to_size(20), box(60, 60, 60).subdivide_to_size(20)
     directions = np.asarray(outer.vertices)
@@ -58,11 +40,6 @@ def test_1496_any_and_id_agree_at_corners_and_edges() -> None:
     assert inner.ray.intersects_any(origins, directions).all()
     # From within a convex solid each ray leaves it once.
     assert first.tolist() == every.tolist() == list(range(len(origins)))
-
-
-def test_2317_rays_along_edges_and_through_corners_hit() -> None:
-    sides = [[x, y, 5] for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y]
-    assert box(2, 2, 2).ray.intersects_any(sides, np.tile([0, 0, -1], (8, 1))).all()
 
 
 def test_1362_a_batch_answers_as_its_rays_one_by_one() -> None:
@@ -84,27 +61,6 @@ def test_1898_places_lie_on_their_rays() -> None:
     assert np.bincount(rays).tolist() == [2] * 50
     # A few ulp of the coordinates, 5 at most.
     assert np.abs(np.cross(places - origins[rays], directions[rays])).max() < 5 * 2.0**-50
-
-
-def test_306_a_ray_in_a_batch_has_the_place_that_it_has_alone() -> None:
-    mesh = trimesh.creation.icosphere(subdivisions=3)
-    origins, directions = mesh.vertices + mesh.vertex_normals * 0.01, -mesh.vertex_normals
-    places, _, _ = mesh.ray.intersects_location(origins, directions, multiple_hits=False)
-    alone, _, _ = mesh.ray.intersects_location(origins[:1], directions[:1], multiple_hits=False)
-    np.testing.assert_array_equal(places[0], alone[0])
-
-
-def test_93_the_first_hit_is_the_nearest() -> None:
-    mesh = box(2, 2, 2)
-    faces, _, places = mesh.ray.intersects_id([[0, 0, -15]], [[0, 0, 1]], multiple_hits=False, return_locations=True)
-    assert places.tolist() == [[0, 0, -1]] and mesh.face_normals[faces].tolist() == [[0, 0, -1]]
-
-
-def test_181_inside_is_the_same_each_time() -> None:
-    mesh = trimesh.creation.icosphere()
-    points = np.random.default_rng(181).uniform(-1.2, 1.2, (2000, 3))
-    first = mesh.contains(points)
-    assert 0 < first.sum() < 2000 and all((mesh.contains(points) == first).all() for _ in range(5))
 
 
 @pytest.mark.parametrize("number", [242, 545])
@@ -139,44 +95,6 @@ def test_331_a_ray_from_a_little_off_the_surface_misses_what_it_leaves() -> None
     off = np.where(normals != 0, np.nextafter(points, 9 * normals), points)
     assert not mesh.ray.intersects_any(off, normals).any()
     assert mesh.ray.intersects_any(off, -normals).all()
-
-
-def test_72_no_ray_slips_between_the_faces() -> None:
-    line = np.linspace(-0.9, 0.9, 40)
-    origins = np.array([[x, y, -5.0] for x in line for y in line])
-    _, rays = box(2, 2, 2).ray.intersects_id(origins, np.tile([0.0, 0.0, 1.0], (1600, 1)))
-    # The diagonals of the faces are met by 40 of them.
-    assert np.bincount(rays).tolist() == [2] * 1600
-
-
-def test_457_rays_through_a_cylinder_pass_it_twice() -> None:
-    line = np.linspace(-0.6, 0.6, 17)  # the axis too, where 32 faces meet
-    origins = np.array([[x, y, -5.0] for x in line for y in line])
-    mesh = trimesh.creation.cylinder(radius=1.0, height=4.0, sections=32)
-    _, rays = mesh.ray.intersects_id(origins, np.tile([0.0, 0.0, 1.0], (289, 1)), multiple_hits=True)
-    assert np.bincount(rays).tolist() == [2] * 289
-
-
-def test_1919_trimesh_itself_agrees_on_a_simple_mesh() -> None:
-    mesh, rng = trimesh.creation.icosphere(subdivisions=2), np.random.default_rng(0)
-    origins, directions = rng.uniform(-2.5, 2.5, (200, 3)), trimesh.unitize(rng.uniform(-0.5, 0.5, (200, 3)))
-    own = trimesh.ray.ray_triangle.RayMeshIntersector(mesh).intersects_any(origins, directions)
-    assert 0 < own.sum() < 200
-    np.testing.assert_array_equal(mesh.ray.intersects_any(origins, directions), own)
-
-
-@cases("count", [1023, 1024, 1025, 2048, 10000])
-def test_1180_the_arrays_have_one_length(count: int) -> None:
-    directions = trimesh.unitize(np.add([0, 0, 0.8], np.random.default_rng(count).uniform(-0.5, 0.5, (count, 3))))
-    places, rays, faces = trimesh.creation.icosphere().ray.intersects_location(
-        np.tile([0.0, 0.0, -5.0], (count, 1)), directions, multiple_hits=False
-    )
-    assert len(places) == len(rays) == len(faces) > 0
-
-
-def test_1786_inside_stays_the_same_over_many_calls() -> None:
-    mesh, points = trimesh.creation.icosphere(), np.random.default_rng(0).uniform(-0.5, 0.5, (256, 3))
-    assert all(mesh.contains(points).all() for _ in range(50))
 
 
 def test_2462_a_ray_in_the_plane_of_a_sheet_misses_it() -> None:

@@ -90,21 +90,6 @@ def test_no_script_is_said(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captu
     assert "Run a script" in capsys.readouterr().out
 
 
-def test_a_linked_script_finds_its_neighbours(tmp_path: Path) -> None:
-    (tmp_path / "real").mkdir()
-    (tmp_path / "real" / "beside.py").write_text("print('here')")
-    (tmp_path / "real" / "s.py").write_text("import beside")
-    (tmp_path / "link.py").symlink_to(tmp_path / "real" / "s.py")
-    assert ran(*DROP_IN, str(tmp_path / "link.py")).stdout == "here\n"
-
-
-def test_a_scripts_module_stays_main_after_it(tmp_path: Path) -> None:
-    script = tmp_path / "s.py"
-    look = "print(type(pickle.loads(pickle.dumps(A()))) is A)"
-    script.write_text(f"import atexit, pickle\nclass A: pass\natexit.register(lambda: {look})\n")
-    assert ran(*DROP_IN, str(script)).stdout == "True\n"
-
-
 def test_a_script_has_its_own_options(tmp_path: Path) -> None:
     script = tmp_path / "s.py"
     script.write_text("import sys, trimesh.proximity as p; print(sys.argv[1:], p.closest_point.__module__)")

@@ -54,17 +54,3 @@ def test_a_known_difference_is_told_with_its_reason(tmp_path: Path) -> None:
     assert done.returncode == 0
     assert f"(known: {reason})" in done.stdout
     assert done.stdout.splitlines()[-1] == "1 passed, 1 failed, 0 skipped; 1 failures known"
-
-
-def test_a_folder_that_is_no_checkout_is_said(tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "validation.conformance", str(tmp_path)],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == (
-        f"conformance: expected a checkout of trimesh's repository, got none: {tmp_path / 'tests' / 'test_ray.py'}\n"
-    )

@@ -10,6 +10,7 @@ import tomlkit
 from cases import cases
 from PIL import Image as Pillow
 from varied import BASE, Table, write_meshes
+from viewer_client import frames
 from viewer_ways import INSIDE, WAYS, WRITTEN, Case, page_of, phong, same, save, save_camera
 
 from renderer import srgb
@@ -56,15 +57,6 @@ def test_a_view_is_the_one_that_is_sent(usual: Case, key: str, way: Any) -> None
     assert same((found, expected))
     blind = (way is phong and key != "m") or (way in (save, save_camera) and key in "wh")
     assert blind or not same((found, way(usual)[0]))
-
-
-def frames(file: bytes) -> list[Any]:
-    read = Pillow.open(io.BytesIO(file))
-    found = []
-    for number in range(read.n_frames):
-        read.seek(number)
-        found.append(np.asarray(read.convert("RGB")))
-    return found
 
 
 @cases("key", TURN)

@@ -11,6 +11,7 @@ import struct
 import subprocess
 import sys
 import time
+import tomllib
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -24,21 +25,17 @@ import numpy as np
 import pytest
 import trimesh
 from numpy.typing import NDArray
+from viewer_client import HEAVY, LONG, PATIENCE, PLAIN, SIZE, Client, Got, camera, fetched, looking, rendered, wait_for
 from viewer_page import MODELS, SCENE
 
-pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
-
-from viewer_client import HEAVY, LONG, PATIENCE, PLAIN, SIZE, Client, Got, camera, fetched, looking, rendered, wait_for
-
 import renderer
-from renderer import load_scene, render
+from renderer import load_scene
 from renderer.cli.main import main
 from renderer.diagnostics.face_phong import face_colors
 from renderer.diagnostics.false_color import false_color, limits_of
 from renderer.diagnostics.tree_boxes import boxes_at, visited
 from renderer.mesh.shapes import icosphere
 from renderer.picture.image import srgb
-from renderer.scene.camera import OrthographicCamera, PerspectiveCamera
 from renderer.trace.spawn import BOUNDED
 from renderer.viewer import app, session
 from renderer.viewer.passes import Answer
@@ -69,21 +66,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def url(folder: Path) -> Iterator[str]:
-    with renderer.view(folder / "blocks.toml", browser=False) as viewing:
-        yield viewing.url
+def scene(folder: Path) -> Path:
+    return folder / "blocks.toml"
 
 
 @pytest.fixture(scope="module")
 def heavy(folder: Path) -> Iterator[str]:
     with renderer.view(folder / "heavy.toml", browser=False) as viewing:
         yield viewing.url
-
-
-@pytest.fixture
-def client(url: str) -> Iterator[Client]:
-    with Client(url) as client:
-        yield client
 
 
 @pytest.fixture
@@ -129,28 +119,14 @@ def test_brute_force_gives_the_same_picture_tile_by_tile(client: Client) -> None
     assert np.array_equal(np.concatenate([p.rgb for p in bands]), octree.rgb)
 
 
-def test_a_small_view_of_many_samples_is_first_shown_with_one(client: Client, folder: Path) -> None:
-    scene = load_scene(folder / "blocks.toml")
-    first, last = client.passes(client.view(w=40, h=30, settings={"samples": 9}))
-    for got, samples in ((first, 1), (last, 9)):
-        assert np.array_equal(got.rgb, srgb(rendered(scene, resolution=(40, 30), samples=samples).radiance))
-
-
-@pytest.mark.parametrize("aov", ["depth", "normal", "face", "cost"])
-def test_an_aov_is_drawn_and_its_scale_told(client: Client, folder: Path, aov: str) -> None:
-    client.view(w=100, h=75, settings={"aov": aov})
-    image = rendered(
-        load_scene(folder / "blocks.toml"),
-        resolution=(100, 75),
-        **({} if aov == "cost" else {"max_depth": 0, "shadows": False}),
-    )
-    if aov in ("depth", "cost"):
-        low, high = limits_of(image, aov)
-        told = client.next()
-        assert isinstance(told, dict) and len(told.pop("colors")) > 1
-        assert told == {"type": "legend", "seq": 1, "step": 0, "w": 100, "h": 75, "aov": aov, "low": low, "high": high}
-    got = client.next()
-    assert isinstance(got, Got) and np.array_equal(got.rgb, false_color(image, aov))
+def test_the_scale_of_an_aov_is_told_before_it_is_drawn(client: Client, folder: Path) -> None:
+    client.view(w=100, h=75, settings={"aov": "depth"})
+    image = rendered(load_scene(folder / "blocks.toml"), resolution=(100, 75), max_depth=0, shadows=False)
+    low, high = limits_of(image, "depth")
+    told, got = client.next(), client.next()
+    assert isinstance(told, dict) and len(told.pop("colors")) > 1
+    assert told == {"type": "legend", "seq": 1, "step": 0, "w": 100, "h": 75, "aov": "depth", "low": low, "high": high}
+    assert isinstance(got, Got) and np.array_equal(got.rgb, false_color(image, "depth"))
 
 
 def test_a_jpeg_looks_like_the_picture(client: Client) -> None:
@@ -160,16 +136,6 @@ def test_a_jpeg_looks_like_the_picture(client: Client) -> None:
     decoded = np.asarray(Pillow.open(io.BytesIO(got.payload)), np.float64)
     # At quality 90 half of all values are within 2 of 255, edges apart, and a wrong row order is off by tens.
     assert got.kind == 2 and len(got.payload) < 200 * 150 and np.abs(decoded - exact.rgb).mean() < 4.0
-
-
-def test_own_phong_is_a_colour_a_face_for_camera_and_light(client: Client, folder: Path) -> None:
-    world = open_file(folder / "blocks.toml").prepared.arrays
-    (got,) = client.passes(client.view(mode="phong"))
-    assert (got.kind, got.step, got.last) == (3, 0, 1)
-    assert got.payload == face_colors(world, (0.5, 2.6, 5.5)).tobytes()
-    lit = client.final(mode="phong", settings={"light": [1.0, -1.0, 0.5]})
-    moved = client.final(mode="phong", eye=(-3.0, 2.0, 1.0))
-    assert len({got.payload, lit.payload, moved.payload}) == 3
 
 
 def test_own_phong_of_glass_and_mirrors_alone_is_lit(tmp_path: Path) -> None:
@@ -246,27 +212,25 @@ def test_while_views_keep_coming_first_passes_are_shown(heavy: str) -> None:
     assert len(shown) >= 3 and set(shown) == {0}
 
 
-def test_a_newer_view_ends_a_running_brute_force(heavy: str, left: list[int]) -> None:
-    with Client(heavy) as client:
-        old = client.view(**LONG)
-        assert client.told("progress")["seq"] == old
-        new = client.view(w=64, h=64)
-        assert [p.seq for p in client.passes(new)] == [new]
-        wait_for(lambda: left == [old], PATIENCE)
-        with pytest.raises(TimeoutError):
-            client.next(0.3)
-
-
-def test_a_cancelled_brute_force_ends_and_says_no_more(heavy: str, left: list[int]) -> None:
+@pytest.mark.parametrize("by", ["a newer view", "cancel", "leaving"])
+def test_a_running_brute_force_ends_where_nobody_waits_for_it(heavy: str, left: list[int], by: str) -> None:
     with Client(heavy) as client:
         seq = client.view(**LONG)
         client.told("progress")
-        client.send(type="cancel")
+        if by == "a newer view":
+            new = client.view(w=64, h=64)
+            assert [p.seq for p in client.passes(new)] == [new]
+        elif by == "cancel":
+            client.send(type="cancel")
+        else:
+            client.socket.socket.shutdown(socket.SHUT_RDWR)  # without a word of WebSocket's
         wait_for(lambda: left == [seq], PATIENCE)
-        with pytest.raises(TimeoutError):
-            while True:  # what was said just before
-                assert client.next(0.3)["type"] == "progress"  # type: ignore[index]
-        assert client.final(w=64, h=64).last
+        if by != "leaving":
+            with pytest.raises(TimeoutError):
+                while True:  # what was said just before
+                    assert client.next(0.3)["type"] == "progress"  # type: ignore[index]
+    with Client(heavy) as other:
+        assert other.final(w=64, h=64).last
 
 
 def test_while_brute_force_runs_others_see_their_pictures(heavy: str, left: list[int]) -> None:
@@ -304,25 +268,15 @@ def test_progress_rises_and_comes_at_most_ten_times_a_second(heavy: str) -> None
 # Bad clients and bad luck
 
 
-def test_a_connection_that_drops_ends_its_picture(heavy: str, left: list[int]) -> None:
-    with Client(heavy) as client:
-        seq = client.view(**LONG)
-        client.told("progress")
-        client.socket.socket.shutdown(socket.SHUT_RDWR)  # without a word of WebSocket's
-        wait_for(lambda: left == [seq], PATIENCE)
-    with Client(heavy) as other:
-        assert other.final(w=64, h=64).last
-
-
-def test_ten_clients_at_once_see_each_their_own(url: str, folder: Path) -> None:
+def test_clients_at_once_see_each_their_own(url: str, folder: Path) -> None:
     scene = load_scene(folder / "blocks.toml")
-    eyes = [(0.5 + 0.3 * i, 2.6, 5.5) for i in range(10)]
+    eyes = [(0.5 + 0.3 * i, 2.6, 5.5) for i in range(4)]
 
     def seen(eye: tuple[float, float, float]) -> NDArray[np.uint8]:
         with Client(url) as client:
             return client.final(eye=eye).rgb
 
-    with ThreadPoolExecutor(10) as pool:
+    with ThreadPoolExecutor(4) as pool:
         pictures = list(pool.map(seen, eyes))
     for eye, picture in zip(eyes, pictures, strict=True):
         assert np.array_equal(picture, srgb(rendered(scene, eye=eye).radiance))
@@ -331,14 +285,8 @@ def test_ten_clients_at_once_see_each_their_own(url: str, folder: Path) -> None:
 @pytest.mark.parametrize(
     "garbage",
     [
-        "",
         "nonsense",
-        "null",
-        "[" * 16000,
-        '{"a":' * 3000,
         b"\0" * 40,
-        '{"type": "view"}',
-        '{"type": "ack", "seq": 1, "step": -1}',
         json.dumps({"type": "view", "seq": 1, "mode": "octree", "m": [0.0] * 16, "fovy": 0.7, "w": 8, "h": 8}),
         json.dumps({"type": "view", "seq": 1, "mode": "gl", "m": [1e308] * 15 + [1.0], "fovy": 0.7, "w": 8, "h": 8}),
         json.dumps({"type": "pick", "seq": 1, "x": 0, "y": 0, "m": [0.0] * 16, "fovy": 0.7, "w": 8, "h": 8}),
@@ -403,11 +351,6 @@ def test_of_many_scenes_asked_for_the_newest_is_opened(folder: Path, monkeypatch
             with suppress(urllib.error.HTTPError):  # the next may have taken its place
                 name = json.loads(fetched(viewing.url, f"scene?id={told['id']}"))["name"]
     assert len(opened) < 20 and opened[-1] == "plain.toml"
-
-
-def test_brute_force_takes_one_sample(client: Client) -> None:
-    one = client.final(mode="brute", w=48, h=32)
-    assert client.final(mode="brute", w=48, h=32, settings={"samples": 64}).payload == one.payload
 
 
 def test_another_scene_is_shown_to_the_page_that_asked_alone(folder: Path) -> None:
@@ -477,48 +420,24 @@ def test_a_scene_that_is_gone_is_not_found(url: str, path: str) -> None:
     assert refused.value.read() == b"id: expected that of a scene that is shown, got 'none'"
 
 
-ORTHOGRAPHIC = {"height": 3.0}
-
-
-def parallel(eye: tuple[float, float, float] = (0.5, 2.6, 5.5)) -> OrthographicCamera:
-    return OrthographicCamera(eye=eye, target=(0.0, 0.5, 0.0), **ORTHOGRAPHIC)
-
-
-def test_an_orthographic_view_is_the_renderers(client: Client, folder: Path) -> None:
-    scene = load_scene(folder / "blocks.toml").model_copy(update={"camera": parallel()})
-    image = render(scene, resolution=(200, 150), max_depth=6)
-    assert np.array_equal(client.final(**ORTHOGRAPHIC).rgb, srgb(image.radiance))
-    client.send(**{"type": "pick", "seq": 7, "x": 140, "y": 100, **looking((0.5, 2.6, 5.5)), **SIZE, **ORTHOGRAPHIC})
-    got = client.told("pick")
-    assert got["face"] == image.face[100, 140] >= 0
-    assert got["t"] == pytest.approx(image.depth[100, 140], rel=1e-12)  # float64 by another order of operations
-
-
 def test_own_phong_of_an_orthographic_view_does_not_depend_on_the_distance(heavy: str) -> None:
     near = looking((0.5, 2.6, 5.5))
     m = np.array(near["m"])
     far = near | {"m": [*m[:12], *(m[12:15] + 3.0 * m[8:11]), 1.0]}
     with Client(heavy) as client:  # whose teapot has highlights, which move with the eye
-        first, again = (client.final(mode="phong", **view, **ORTHOGRAPHIC).payload for view in (near, far))
-        assert client.final(mode="phong", **near).payload != client.final(mode="phong", **far).payload
+        first, again = (client.final(mode="phong", **view, height=3.0).payload for view in (near, far))
+        one, other = (client.final(mode="phong", **view) for view in (near, far))
+    assert one.kind == 3 and one.payload != other.payload
     # Directions to a millionth: a code in a million may fall on the other side of where it begins.
     different = np.frombuffer(first, np.uint8) != np.frombuffer(again, np.uint8)
     assert different.mean() < 1e-3
 
 
-def test_a_saved_orthographic_camera_is_the_one_that_was_sent(client: Client, tmp_path: Path) -> None:
-    client.send(type="camera", **looking((0.5, 2.6, 5.5)), **ORTHOGRAPHIC)
-    scene = re.sub(r"\[camera\][^\[]*(\[[^\[\]]*\][^\[]*){2}", "", SCENE, count=1)
-    (tmp_path / "a.toml").write_text(scene + "\n" + client.told("camera")["text"])
-    loaded = load_scene(tmp_path / "a.toml").camera
-    assert isinstance(loaded, OrthographicCamera) and loaded.height == 3.0
-    # The target is eye minus axis, rounded, and the frame is made from it again.
-    assert np.allclose(loaded.frame(), parallel().frame(), rtol=0.0, atol=1e-14)
-
-
 def test_a_saved_camera_is_not_offered_as_a_scene(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text((folder / "blocks.toml").read_text(encoding="utf-8"))
-    (tmp_path / "camera.toml").write_text(camera_toml(camera((0.5, 2.6, 5.5))))
+    saved = camera_toml(camera((0.5, 2.6, 5.5)))
+    (tmp_path / "camera.toml").write_text(saved)
+    (tmp_path / "settings.toml").write_text(f"{saved}[render]\nsamples = 4\n")
     (tmp_path / "broken.toml").write_text("[camera")
     (tmp_path / "folder.toml").mkdir()
     assert open_file(tmp_path / "a.toml").files == ["a.toml", "broken.toml", "folder.toml"]
@@ -527,7 +446,7 @@ def test_a_saved_camera_is_not_offered_as_a_scene(folder: Path, tmp_path: Path) 
 # Clicks, cameras, and what is fetched
 
 
-@pytest.mark.parametrize(("x", "y"), [(100, 90), (140, 100), (3, 3)])
+@pytest.mark.parametrize(("x", "y"), [(140, 100), (3, 3)])
 def test_a_click_tells_what_the_ray_meets(client: Client, folder: Path, x: int, y: int) -> None:
     shown = open_file(folder / "blocks.toml")
     view = looking((0.5, 2.6, 5.5))
@@ -551,22 +470,12 @@ def test_a_click_tells_what_the_ray_meets(client: Client, folder: Path, x: int, 
 
 
 @pytest.mark.parametrize("walk", [False, True])
-def test_a_saved_camera_is_the_one_that_was_sent(client: Client, tmp_path: Path, walk: bool) -> None:
-    view = looking((0.3, 2.0, 4.0)) | {"fovy": 0.7}
-    client.send(type="camera", walk=walk, **view)
+def test_the_target_of_a_saved_camera_is_near_where_the_page_walks(client: Client, walk: bool) -> None:
+    client.send(type="camera", walk=walk, **looking((0.3, 2.0, 4.0)))
     answer = client.told("camera")
-    scene = re.sub(r"\[camera\][^\[]*(\[[^\[\]]*\][^\[]*){2}", "", SCENE, count=1)
-    assert "[camera]" not in scene
-    (tmp_path / "a.toml").write_text(scene + "\n" + answer["text"])
-    loaded = load_scene(tmp_path / "a.toml").camera
-    assert isinstance(loaded, PerspectiveCamera) and answer["name"] == "camera.toml"
-    right, up, forward = loaded.frame()
-    again = [*right, 0.0, *up, 0.0, *-forward, 0.0, *loaded.eye, 1.0]
-    # The target is eye minus axis, rounded, and the frame is made from it again.
-    assert np.allclose(again, view["m"], rtol=0.0, atol=1e-14) and loaded.fov == math.degrees(view["fovy"])
-    assert camera_toml(loaded) == answer["text"]
-    distance = float(np.linalg.norm(np.subtract(loaded.target, loaded.eye)))
-    assert distance == pytest.approx(1.0) if walk else distance > 2.0
+    saved = tomllib.loads(answer["text"])["camera"]
+    distance = math.dist(saved["target"], saved["eye"])
+    assert answer["name"] == "camera.toml" and (distance == pytest.approx(1.0) if walk else distance > 2.0)
 
 
 def test_the_scene_is_described(url: str, folder: Path) -> None:

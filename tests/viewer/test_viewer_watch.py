@@ -11,11 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from viewer_page import MODELS, SCENE
-
-pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
-
 from viewer_client import PATIENCE, Client, rendered
+from viewer_page import MODELS, SCENE
 
 import renderer
 from renderer import load_scene

@@ -19,7 +19,8 @@ from validation.defects.places import find_name
 
 PACKAGE = Path(__file__).resolve().parents[2] / "renderer"
 _DIGEST = "renderer.jit.digest"
-_LOADED = "renderer.jit.loaded"
+# What the package itself imports.
+_FIRST = ("renderer.jit.loaded", "renderer.lazy_names")
 
 
 def inject(change: Change) -> None:
@@ -42,9 +43,9 @@ def inject(change: Change) -> None:
 
 
 def _sound_modules() -> Iterator[str]:
-    """The renderer's modules in this process, except the package's own import clock and its parents."""
+    """The renderer's modules in this process, except those that the package itself imports, and their parents."""
     for name in sys.modules:
-        if name.startswith("renderer.") and not _LOADED.startswith(name):
+        if name.startswith("renderer.") and not any(first.startswith(name) for first in _FIRST):
             yield name
 
 

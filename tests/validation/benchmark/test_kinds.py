@@ -8,7 +8,7 @@ import pytest
 
 from renderer.mesh.shapes import box
 from renderer.octree import Octree
-from validation.benchmark.measures.kinds import KINDS, rounding, title
+from validation.benchmark.measures.kinds import KINDS, rounding
 from validation.benchmark.peers.contender import Family, HitLists, Points
 
 # The largest coordinate of the box and of all that is asked here is 4: limits are 2^-18.
@@ -85,8 +85,3 @@ def test_a_grazing_hit_may_be_off_along_the_ray_but_not_above_the_face(octree: O
     for off, expected in ((0.9, False), (1.1, True)):
         theirs = ours._replace(t=ours.t + np.array([off * LIMIT, 0.0]))
         assert kind.differing(octree, rays, ours, theirs).tolist() == [expected]
-
-
-def test_titles_tell_rays_from_points() -> None:
-    assert title("camera", "closest") == "camera rays, closest hit"
-    assert title("near", "signed") == "near points, signed distance"

@@ -11,7 +11,7 @@ from validation.benchmark.peers.ours import OURS
 
 @pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="needs Linux's /proc/self/clear_refs")
 def test_memory_grows_with_the_mesh_and_not_with_the_library() -> None:
-    mesh = meshes.displaced_spheres(400_000)
+    mesh = meshes.displaced_spheres(200_000)
     row = memory.measure(mesh, [system(OURS), system("embree")], lambda _: None)
     assert row is not None and set(row["systems"]) == {OURS, "embree"}
     for found in row["systems"].values():

@@ -10,12 +10,11 @@ import pytest
 from contenders import system
 
 from renderer.mesh.mesh import Mesh
-from renderer.mesh.shapes import box
 from renderer.octree import Octree
 from validation.benchmark.measures.families import points
 from validation.benchmark.measures.kinds import FIRST, KINDS
 from validation.benchmark.peers import libllvm, systems
-from validation.benchmark.peers.contender import Family, HitLists, Points
+from validation.benchmark.peers.contender import Family, HitLists
 from validation.benchmark.peers.ours import OURS, OURS_ONE, OURS_TWO
 
 
@@ -70,39 +69,6 @@ def test_a_contender_agrees_with_ours_on_all_hits_and_points(
     assert found == _MORE[name]
 
 
-@pytest.mark.parametrize("name", [OURS, "open3d", "trimesh_embreex", "trimesh", "libigl"])
-def test_a_contender_answers_for_a_box_as_geometry_says(name: str) -> None:
-    mesh = box()
-    peer = system(name).loaded(mesh.vertices, mesh.faces)
-    o, d = np.array([[0.25, 0.5, 2.0], [0.25, 0.5, 0.5], [3.0, 3.0, 3.0]]), np.array([[0.0, 0.0, -2.0]] * 3)
-    lists, count = peer.all(Family("some", o, d)), peer.count(Family("some", o, d))
-    if lists is not None:
-        hits = lists.read(lists.trace())
-        assert isinstance(hits, HitLists) and hits.counts.tolist() == [2, 1, 0]
-        assert hits.t == pytest.approx([0.5, 1.0, 0.25], abs=1e-6)
-        assert set(mesh.vertices[mesh.faces[hits.face]][:, :, 2].mean(axis=1)) == {0.0, 1.0}
-    assert count is None or count.read(count.trace()).tolist() == [2, 1, 0]
-    at = Points("some", np.array([[0.25, 0.5, 0.625], [0.25, 0.5, 3.0], [-3.0, 0.5, 5.0]]))
-    for query, expected in ((peer.contains(at), [True, False, False]), (peer.nearest(at), [0.25, 2.0, 5.0]),
-                            (peer.signed(at), [-0.25, 2.0, 5.0])):  # fmt: skip
-        assert query is None or query.read(query.trace()).tolist() == pytest.approx(expected, abs=1e-6)
-
-
-@pytest.mark.parametrize("name", ["open3d", "trimesh_embreex"])
-def test_all_hits_of_rays_with_an_end_are_not_asked_where_there_is_no_argument_for_it(name: str, mesh: Mesh) -> None:
-    peer = system(name).loaded(mesh.vertices, mesh.faces)
-    ended = Family("one", np.zeros((1, 3)), np.ones((1, 3)), 1.0)
-    assert peer.all(ended) is None and peer.count(ended) is None
-
-
-def test_a_ray_with_an_end_has_fewer_hits_of_ours() -> None:
-    peer = system(OURS).loaded(box().vertices, box().faces)
-    ended = Family("one", np.array([[0.25, 0.5, 2.0]]), np.array([[0.0, 0.0, -2.0]]), 0.75)
-    lists, count = peer.all(ended), peer.count(ended)
-    assert lists is not None and count is not None
-    assert lists.read(lists.trace()).t.tolist() == [0.5] and count.read(count.trace()).tolist() == [1]
-
-
 def test_lists_of_hits_are_sorted_by_ray_then_t_then_face() -> None:
     ray, t, face = np.array([2, 0, 2, 2, 0]), np.array([3.0, 1.0, 0.5, 3.0, 0.25]), np.array([7, 1, 2, 6, 0])
     hits = HitLists.sorted(4, ray, t, face)
@@ -121,17 +87,6 @@ def test_a_ray_ends_where_it_should(name: str) -> None:
         assert query.read(query.trace()).tolist() == [expected]
 
 
-@pytest.mark.parametrize("name", ["embree", "open3d", "mitsuba_llvm"])
-def test_short_rays_end_for_a_contender_too(name: str, mesh: Mesh, octree: Octree, rays: tuple[Family, ...]) -> None:
-    short = next(family for family in rays if family.name == "short")
-    asked = system(name).loaded(mesh.vertices, mesh.faces).any(short)
-    assert asked is not None
-    expected = octree.any_hit(short.origins, short.directions, t_max=short.t_max)
-    # Else nothing is told by what follows: without their end, more of them hit.
-    assert expected.sum() < 0.8 * octree.any_hit(short.origins, short.directions).sum()
-    assert np.array_equal(asked.read(asked.trace()), expected)
-
-
 def test_what_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     def absent(name: str) -> Any:
         raise ModuleNotFoundError(f"No module named {name!r}")
@@ -141,19 +96,6 @@ def test_what_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None
     assert {system.name for system in found} - {OURS_TWO} == {OURS, OURS_ONE}
     assert set(missing) == set(systems._PEERS) | {"mitsuba_llvm"}
     assert "pip install open3d" in missing["open3d"] and "libllvm19" in missing["mitsuba_llvm"]
-
-
-@pytest.mark.parametrize(
-    ("path", "major"),
-    [
-        ("/usr/lib/x86_64-linux-gnu/libLLVM.so.19.1", 19),
-        ("/usr/lib/x86_64-linux-gnu/libLLVM-15.so.1", 15),
-        ("/nowhere/llvm-20/lib/libLLVM.so", 20),
-        ("/opt/nowhere/libLLVM.so", 0),
-    ],
-)
-def test_the_version_of_a_libllvm_is_read_from_its_path(path: str, major: int) -> None:
-    assert libllvm.version(path) == major
 
 
 def test_a_libllvm_that_the_user_names_is_the_only_candidate(monkeypatch: pytest.MonkeyPatch) -> None:

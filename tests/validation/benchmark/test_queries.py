@@ -14,9 +14,8 @@ from validation.benchmark.measures import calls, queries
 from validation.benchmark.measures.families import points
 from validation.benchmark.measures.kinds import KINDS
 from validation.benchmark.measures.meshes import named
-from validation.benchmark.peers import ours
 from validation.benchmark.peers.contender import Family, System
-from validation.benchmark.peers.ours import OURS, OURS_ONE, OURS_TWO, Ours
+from validation.benchmark.peers.ours import OURS, OURS_ONE, OURS_TWO
 
 
 def test_measured_rows_say_who_hit_what(mesh: Mesh) -> None:
@@ -74,12 +73,6 @@ def test_a_contender_that_sees_another_scene_is_found(name: str, mesh: Mesh) -> 
     assert rows and not any(row["agree"] for row in rows)
 
 
-def test_a_mesh_that_is_open_is_not_asked_what_is_inside(mesh: Mesh) -> None:
-    opened = Mesh(mesh.vertices, mesh.faces[1:])
-    rows = queries.measure(opened, [system(OURS)], 300, lambda _: None)
-    assert {row["query"] for row in rows} == set(KINDS) - {"contains", "signed"}
-
-
 def test_other_kinds_of_meshes_are_asked_in_brief_and_fast_contenders_only() -> None:
     chosen = [system(name) for name in (OURS, "embree", "libigl", "mitsuba_scalar")]
     rows = queries.measure(named("city_300"), chosen, 300, lambda _: None, brief=True)
@@ -106,22 +99,6 @@ def test_the_efficiency_is_that_of_two_threads() -> None:
     assert queries._efficiency(each, 2) == pytest.approx(2.0)
     del each[OURS_TWO]
     assert queries._efficiency(each, 16) is None and queries._efficiency(each, 1) is None
-
-
-@pytest.mark.parametrize(("threads", "names"), [(1, []), (2, []), (16, [OURS_TWO])])
-def test_two_threads_are_a_contender_where_all_are_more(
-    threads: int, names: list[str], mesh: Mesh, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(ours, "available_threads", lambda: threads)
-    found = ours.systems()
-    assert [s.name for s in found] == [OURS, OURS_ONE, *names] and not any(s.times_build for s in found[1:])
-    peers = queries._peers(mesh, [replace(s, threads=s.threads) for s in found])
-    first = peers[OURS]
-    assert isinstance(first, Ours)
-    for name, expected in ((OURS_ONE, 1), (OURS_TWO, 2)):
-        other = peers.get(name)
-        if isinstance(other, Ours):
-            assert other.octree.threads == expected and other.octree.mesh is first.octree.mesh
 
 
 def test_calls_of_few_rays_are_compared_thread_by_thread(monkeypatch: pytest.MonkeyPatch) -> None:

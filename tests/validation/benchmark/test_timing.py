@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from validation import timing
-from validation.timing import interleaved, median_seconds, ratio, timed
+from validation.timing import interleaved, ratio
 
 
 def test_contenders_take_turns_after_a_rest_and_the_first_round_is_not_seen(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -30,17 +30,3 @@ def test_the_ratio_is_the_median_of_the_rounds() -> None:
     # The ratio of the medians would be 4 / 2.
     assert ratio([3.0, 4.0, 9.0], [3.0, 2.0, 1.0]) == 2.0
     assert ratio([2.0, 4.0, 30.0], [2.0, 1.0, 10.0]) == 3.0
-
-
-def test_the_median_leaves_out_the_first_round_and_all_take_turns():
-    order = []
-
-    def clock(name, seconds):
-        return lambda: order.append(name) or seconds.pop(0)
-
-    assert median_seconds({"a": clock("a", [99.0, 3.0, 1.0, 2.0]), "b": clock("b", [0.0, 5.0, 5.0, 7.0])}, 3) == {
-        "a": 2.0,
-        "b": 5.0,
-    }
-    assert order == ["a", "b"] * 4
-    assert timed(sorted, [2, 1])() > 0.0

@@ -47,18 +47,6 @@ def test_each_commit_answers_with_its_own_code(commits: list[str], tmp_path: Pat
             assert row["query"] == ("any" if row["family"] == "shadow" else "closest")
 
 
-def test_the_command_prints_a_line_for_each_mesh_and_family(
-    commits: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
-    monkeypatch.setattr(versions, "_RUNS", 1)
-    monkeypatch.setattr(versions.compare, "__defaults__", (tmp_path,))  # the repository
-    assert versions.main([*commits, "--mesh", "1000", "city_300", "--rays", "64"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert {line.split(":")[0] for line in lines} == {"1000", "city_300"}
-    assert any("camera, closest: " in line and line.endswith("OTHER BITS") for line in lines)
-    assert any("shadow, any: " in line and line.endswith("same bits") for line in lines)
-
-
 def test_a_commit_that_is_not_there_is_named(tmp_path: Path, commits: list[str]):
     with pytest.raises(ValueError, match="commit: expected one with the package renderer, got 'f00': "):
         list(versions.compare((commits[0], "f00"), "1000", 8, 1, tmp_path))

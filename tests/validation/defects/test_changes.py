@@ -98,9 +98,3 @@ def test_python_is_found_where_it_is_defined_or_imported(package: Path) -> None:
     assert find_name(package, "module.helper") == ("package.deep.module", "helper")
     with pytest.raises(ValueError, match=r"expected one .module\.other., got none"):
         find_name(package, "module.other")
-
-
-def test_it_moves_with_its_file(package: Path) -> None:
-    before = Rule("reset", drop).altered(package).text
-    (package / "deep" / "module.py").rename(package / "elsewhere.py")
-    assert Rule("reset", drop).altered(package).text == before

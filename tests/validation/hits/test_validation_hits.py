@@ -20,11 +20,11 @@ from validation.gates import Gate
 from validation.hits import check as check_hits
 from validation.hits import leaks as hit_leaks
 from validation.hits import section as hits
-from validation.hits.rays import families, float32_exact
+from validation.hits.rays import float32_exact
 from validation.job import Job
 from validation.references.table import REFERENCES, HitReference
 from validation.report import page as report
-from validation.thresholds import HitLimits, Thresholds
+from validation.thresholds import Thresholds
 
 QUICK = tuple(one for one in REFERENCES if one.key in ("embree_robust", "embree_default", "igl"))
 EFFORT = hits.HitEffort(rays=300, exact=60, leaks=2_000, references=QUICK)
@@ -97,13 +97,6 @@ def test_a_broken_octree_turns_a_gate_red(change: Callable[[Octree], None], monk
     assert failing(checked(ball())[1]) == {"rays on which we are wrong", sample}
 
 
-def test_exact_arithmetic_judges_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    alone = dataclasses.replace(EFFORT, exact=EFFORT.rays, references=())
-    assert failing(checked(ball(), alone)[1]) == set()
-    broken(monkeypatch, _drop_a_face)
-    assert failing(checked(ball(), alone)[1]) == {"of the exact sample, rays on which we are wrong"}
-
-
 def _blind(octree: Octree) -> None:
     octree.any_hit = lambda origins, directions: np.zeros(len(origins), dtype=np.bool_)  # type: ignore[method-assign]
 
@@ -151,35 +144,6 @@ def test_a_reference_that_is_wrong_does_not_speak_against_us() -> None:
     assert found[0]["sizes"]["other_face"] > 50
 
 
-def test_whoever_finds_a_wrong_ray_is_heard(monkeypatch: pytest.MonkeyPatch) -> None:
-    broken(monkeypatch, _drop_a_face)
-    for order in (1, -1):
-        asked = (QUICK[0], reference(most_rays=1))[::order]
-        assert "rays on which we are wrong" in failing(
-            checked(ball(), dataclasses.replace(EFFORT, references=asked))[1]
-        )
-
-
-def test_references_get_no_more_than_they_take(monkeypatch: pytest.MonkeyPatch) -> None:
-    few, small, coarse = reference(most_rays=7), reference(most_faces=319), reference(precision="float32")
-    effort = dataclasses.replace(EFFORT, references=(few,))
-    record, _ = checked(ball(), effort)
-    assert {family["references"][0]["rays"] for family in record["families"]} == {7}
-    batch = families(ball().vertices, ball().faces, EFFORT.rays, check_hits.SEED)[0]
-    for one in record["families"][0]["references"][0]["listed"]:
-        assert one["origin"] == tuple(batch.origins[one["ray"]])
-        assert one["direction"] == tuple(batch.directions[one["ray"]])
-    monkeypatch.setattr(hit_leaks, "leak_meshes", lambda: {"icosphere": icosphere(2)})
-    leaks, _ = hits.check_leaks(effort, job())
-    assert {one["references"][0]["rays"] for one in leaks["sets"]} == {7}
-    record, _ = checked(ball(), dataclasses.replace(EFFORT, references=(small,)))
-    assert list(record["left_out"]) == ["Wrong"] and "319 faces" in record["left_out"]["Wrong"]
-    turned = Mesh(ball().vertices * np.pi, ball().faces)
-    assert check_hits.can_judge(coarse, ball()) is None
-    assert "float32" in str(check_hits.can_judge(coarse, turned))
-    assert check_hits.can_judge(reference(precision="float64"), turned) is None
-
-
 def test_a_users_mesh_is_judged_by_those_that_can(tmp_path: Path) -> None:
     path = tmp_path / "turned.obj"
     rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in (ball().vertices * np.pi).tolist()]
@@ -209,16 +173,6 @@ def test_a_mesh_beyond_float32_is_refused() -> None:
     for scale in (1e-31, 1e31):
         with pytest.raises(ValueError, match="expected faces whose largest coordinate is 1e-30 to 1e30, got 1e"):
             checked(Mesh(ball().vertices * scale, ball().faces))
-
-
-def test_thresholds_decide() -> None:
-    limits = Thresholds(hits=HitLimits(wrong=3, any_hit_differs=4, near_edge=5, leaks=6, few_differ=7))
-    asked = dataclasses.replace(job(), thresholds=limits)
-    _, gates = hits.check_mesh("ball", ball(), EFFORT, asked)
-    assert {gate.threshold for gate in gates} == {3, 4, 5, 7}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(hit_leaks, "leak_meshes", lambda: {"icosphere": icosphere(2)})
-        assert {gate.threshold for gate in hits.check_leaks(EFFORT, asked)[1]} == {6}
 
 
 def test_a_hole_is_a_leak(monkeypatch: pytest.MonkeyPatch) -> None:

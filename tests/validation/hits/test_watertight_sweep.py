@@ -50,24 +50,6 @@ def test_what_is_shot_at_is_closed(name):
     assert closed.inside(rng(), 7).shape == (7, 3)
 
 
-def test_the_integer_box_has_whole_numbers_and_unit_squares():
-    mesh = SHAPES["integer box"].mesh
-    assert len(mesh.faces) == 6 * 64 * 2 and len(mesh.vertices) == 9**3 - 7**3
-    assert (mesh.vertices == np.rint(mesh.vertices)).all()
-    area = np.cross(mesh.triangles[:, 1] - mesh.triangles[:, 0], mesh.triangles[:, 2] - mesh.triangles[:, 0])
-    assert (np.linalg.norm(area, axis=1) == 1.0).all()
-    # Outwards, seen from the middle.
-    assert ((mesh.triangles.mean(axis=1) - 4.0) * area).sum(axis=1).min() > 0
-
-
-def test_the_hilly_sphere_is_not_convex():
-    mesh = SHAPES["hilly sphere"].mesh
-    outwards = np.cross(mesh.triangles[:, 1] - mesh.triangles[:, 0], mesh.triangles[:, 2] - mesh.triangles[:, 0])
-    # A convex mesh has no vertex before the plane of a face.
-    in_front = (mesh.vertices[None] - mesh.triangles[::50, :1]) @ outwards[::50, :, None]
-    assert in_front.max() > 1e-6
-
-
 @cases("place", PLACES)
 @cases("kind", watertight.KINDS)
 def test_the_rays_come_so_close_that_a_leaky_kernel_leaks(place, kind):

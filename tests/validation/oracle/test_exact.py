@@ -1,6 +1,5 @@
 """The rational oracle: its semantics, an independent twin, and the proof of its float64 filter."""
 
-import math
 from fractions import Fraction
 
 import numpy as np
@@ -59,12 +58,6 @@ def test_interval_is_closed(t_min, t_max, hit):
     assert (exact.closest_hits(TRIANGLE, ONE, [[1, 1, 2]], [[0, 0, -1]], t_min, t_max)[0] is not None) == hit
 
 
-def test_line_behind_the_origin_counts_when_t_min_allows():
-    assert exact.closest_hit(TRIANGLE, ONE, [1, 1, -2], [0, 0, -1]) is None
-    found = exact.closest_hit(TRIANGLE, ONE, [1, 1, -2], [0, 0, -1], t_min=-math.inf)
-    assert found == exact.ExactHit(Fraction(-2), 0, (0,))
-
-
 def test_ties_name_all_faces_and_the_lowest():
     lowered = np.subtract(TRIANGLE, [0, 0, 1])
     vertices = np.vstack([TRIANGLE, lowered, [[4, 4, 0]]])
@@ -72,16 +65,6 @@ def test_ties_name_all_faces_and_the_lowest():
     found = exact.closest_hit(vertices, faces, [2, 2, 3], [0, 0, -1])
     assert found == exact.ExactHit(Fraction(3), 1, (1, 2, 3))
     assert exact.closest_hit(vertices, faces, [2, 2, 3], [0, 0, -1], candidates=[3, 0]).faces_at_t == (3,)
-
-
-def test_a_big_face_and_an_early_exit():
-    """A face that reaches past its cell, and a nearer face behind a farther one's box: known answers."""
-    pins = [[0, 0, 0], [2, 2, 2]]
-    first = [[0.5, 0.5, 0.95], [1.95, 0.1, 0.3], [1.95, 0.9, 0.3]]
-    second = [[1.25, 0.3, 0.3], [1.25, 0.7, 0.3], [1.25, 0.5, 0.8]]
-    vertices = np.array([*pins, *first, *second])
-    found = exact.closest_hits(vertices, [[2, 3, 4], [5, 6, 7]], [[-1, 0.5, 0.5]], [[1, 0, 0]])[0]
-    assert found.face == 1 and found.t == Fraction(9, 4)
 
 
 @given(st.lists(st.one_of(GRID, FLOATS), min_size=15, max_size=15))
@@ -174,24 +157,6 @@ def test_a_filter_without_its_error_bound_is_caught(monkeypatch, batch, constant
     assert disagreements(batch()) > 0
 
 
-def test_filter_discards_nearly_everything():
-    """The filter is there to save rational tests: a ray through a soup of 4,096 small faces keeps few of
-    them.
-    """
-    rng = np.random.default_rng(1)
-    corners = rng.random((4096, 1, 3)) + 0.05 * rng.random((4096, 3, 3))
-    origins, directions = rng.random((100, 3)) - [2, 0, 0], np.tile([1.0, 0.0, 0.0], (100, 1))
-    ray, face = exact._BoxTree(corners).candidates(origins, directions, 0.0, math.inf)
-    hit = [exact.intersect(corners[f], origins[r], directions[r]) is not None for r, f in zip(ray, face, strict=True)]
-    assert all(hit) and len(hit) == 75
-
-
-def test_possible_faces_grow_with_the_roundoff():
-    beside = [2.0, -1e-8, 1.0]
-    assert len(exact.possible_faces(TRIANGLE, ONE, beside, [0, 0, -1])) == 0
-    assert exact.possible_faces(TRIANGLE, ONE, beside, [0, 0, -1], 2.0**-24).tolist() == [0]
-
-
 def test_overflow_and_denormals_lose_nothing():
     for scale in (1e-320, 1e-200, 1e300):
         hits = exact.closest_hits(TRIANGLE * scale, ONE, [[scale, scale, scale]], [[0, 0, -1]])
@@ -218,8 +183,3 @@ def test_overflow_and_denormals_lose_nothing():
 def test_errors_name_the_argument(arguments, message):
     with pytest.raises(ValueError, match=message):
         exact.closest_hits(*arguments)
-
-
-def test_nothing_to_hit_and_nothing_to_shoot():
-    assert exact.closest_hits(TRIANGLE, np.empty((0, 3), int), [[0, 0, 1]], [[0, 0, 1]]) == [None]
-    assert exact.closest_hits(TRIANGLE, ONE, np.empty((0, 3)), np.empty((0, 3))) == []

@@ -94,19 +94,6 @@ def test_bound_is_sharp_enough_to_see_a_fault():
         assert t_bounds(triangle[None], o[None], d[None], edges)[0] < 1e-12 * float(hit.t)
 
 
-@pytest.mark.parametrize("roundoff", [FLOAT64_ROUNDOFF, FLOAT32_ROUNDOFF])
-def test_bound_has_the_dimension_of_t(roundoff):
-    """Exactly, for powers of two: t grows with positions and shrinks with the direction."""
-    corners, origins, directions = needles(np.random.default_rng(12), 1.0)
-    edges = np.array([[float(x) for x in exact.determinants(*ray)[:3]]
-                      for ray in zip(corners, origins, directions, strict=True)])  # fmt: skip
-    bound = t_bounds(corners, origins, directions, edges, roundoff)
-    assert np.isfinite(bound).sum() > 100
-    for place, way in ((16.0, 1.0), (1.0, 8.0), (0.25, 0.5)):
-        scaled = t_bounds(corners * place, origins * place, directions * way, edges * place**2 * way, roundoff)
-        np.testing.assert_array_equal(scaled, bound * place / way)
-
-
 def view(origin, direction):
     return RayView(VERTICES, FACES, tuple(map(float, origin)), tuple(map(float, direction)), FLOAT64_ROUNDOFF)
 

@@ -16,7 +16,7 @@ from validation.oracle.starts import First, Start, Surface, first_hit, start_nea
 from validation.oracle.vectors import dot, rational
 
 ZERO = Fraction(0)
-WAYS = [way for way in product((-2, -1, 0, 1, 3), repeat=3) if any(way)]
+WAYS = [way for way in product((-1, 0, 2), repeat=3) if any(way)]
 # Each side of a unit cube as two triangles, wound outwards.
 SQUARES = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
 
@@ -75,28 +75,6 @@ def test_a_cube_from_its_corners_edges_and_sides_outwards_is_the_rest():
                 assert found.face not in at and found.t != 0
 
 
-def test_a_tetrahedron_from_each_corner_in_both_directions_of_each_side():
-    vertices, faces = (
-        np.array([[0, 0, 0], [3, 0, 0], [0, 3, 0], [0, 0, 3]], float),
-        [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
-    )
-    surface = Surface(vertices, faces)
-    for corner, face in product(range(4), range(4)):
-        if corner not in faces[face]:
-            continue
-        start, others = Start(place(*vertices[corner]), face), [k for k in range(4) if k != corner]
-        towards = vertices[others].sum(axis=0) - 3 * vertices[corner]
-        opposite = next(f for f in range(4) if corner not in faces[f])
-        assert surface.first(start, towards, -1) == [First(Fraction(1, 3), opposite, (opposite,))]
-        lowest = min(f for f in range(4) if corner in faces[f])
-        assert surface.first(start, -towards, -1) == [First(ZERO, lowest, (lowest,))]
-        assert surface.first(start, towards, 1) == [First(ZERO, lowest, (lowest,))]
-        assert surface.first(start, -towards, 1) == [First(None, -1, ())]
-        # Along an edge the ray is in both its faces and stopped by neither; the far corner is of neither.
-        along = vertices[others[0]] - vertices[corner]
-        assert surface.first(start, along, -1)[0].t == 1 and surface.first(start, along, 1)[0].t == 1
-
-
 @cases("degrees", [0.1, 1.0, 30.0, 90.0, 179.9, 180.1, 270.0, 300.0, 359.0])
 def test_a_prism_is_a_wedge_at_its_edge(degrees):
     """Two walls from the z axis: along x and turned by the angle. Inside is what lies between."""
@@ -108,7 +86,7 @@ def test_a_prism_is_a_wedge_at_its_edge(degrees):
     surface = Surface(vertices, faces + ceiling)
     rng = np.random.default_rng(3)
     outwards = [[Fraction(0), Fraction(-1)], [-Fraction(s), Fraction(c)]]
-    for start, turn in product((surface.start_on(1, 0.0, 0.5), surface.start_on(3, 0.25, 0.0)), range(200)):
+    for start, turn in product((surface.start_on(1, 0.0, 0.5), surface.start_on(3, 0.25, 0.0)), range(60)):
         way = rng.normal(size=3) if turn % 4 else np.array([c, s, rng.normal()])
         leads = [n[0] * Fraction(way[0]) + n[1] * Fraction(way[1]) for n in outwards]
         inside = max(leads) <= 0 if degrees < 180 else min(leads) <= 0
@@ -120,50 +98,6 @@ def test_a_prism_is_a_wedge_at_its_edge(degrees):
                 assert all(one.face not in (1, 3) for one in found)
             else:
                 assert found == [First(ZERO, stops[0], (stops[0],))]
-
-
-def test_two_cubes_that_touch_along_an_edge_leave_four_wedges():
-    vertices, faces = joined(cube((0, 0, 0)), cube((-2, -2, 0)))
-    surface, along = Surface(vertices, faces), normals(vertices, faces)
-    point = place(0, 0, Fraction(1, 3))
-    at = held(surface, point)
-    assert len(at) == 4
-    for face, side, way in product(at, (-1, 1), WAYS):
-        # Each wedge is a quarter; the one beside the face is where its own side and its own half are.
-        middle = vertices[faces[face]].mean(axis=0) * [1, 1, 0]
-        beside = np.sign(middle + side * along[face])[:2]
-        stops = [f for f in at if way_beyond(along[f], way, beside)]
-        (found,) = surface.first(Start(point, face), way, side)
-        if all(beside * way[:2] >= 0):
-            assert found.face not in at
-        else:
-            assert found == First(ZERO, stops[0], (stops[0],)), (face, side, way)
-
-
-def way_beyond(normal, way, quarter):
-    """Whether a wall of a quarter, known by its normal, has the quarter on one side and a direction on the other.
-
-    The wall x = 0 of the cubes has y of the cube's sign; which quarters it borders follows from that.
-    """
-    axis = int(np.abs(normal[:2]).argmax())
-    # The first cube is where both are positive, its normals look to the negative; the second is the other way.
-    half = -np.sign(normal[axis])
-    return quarter[1 - axis] == half and quarter[axis] * way[axis] < 0
-
-
-def test_two_cubes_that_touch_at_a_corner_leave_one_outside():
-    vertices, faces = joined(cube((0, 0, 0)), cube((-2, -2, -2)))
-    surface = Surface(vertices, faces)
-    at = held(surface, place(0, 0, 0))
-    first, second = [f for f in at if f < 12], [f for f in at if f >= 12]
-    for face, way in product(at, WAYS):
-        (found,) = surface.first(Start(place(0, 0, 0), face), way, 1)
-        if min(way) > 0:
-            assert found == First(ZERO, first[0], (first[0],))
-        elif max(way) < 0:
-            assert found == First(ZERO, second[0], (second[0],))
-        else:
-            assert found.face not in at
 
 
 def test_two_cubes_with_a_common_side_have_three_regions_there():
@@ -215,18 +149,6 @@ def test_partly_coinciding_faces_stop_a_ray_only_where_they_overlap():
     assert surface.first(Start(inner, 0), (0, 0, 1), 1, True) == [First(ZERO, 1, (1,))]
 
 
-def test_an_open_fan_is_one_region():
-    rim = np.array([[3, 0, 1], [0, 3, -1], [-3, 0, 1], [0, -3, 2]], float)
-    vertices = np.concatenate([[[0, 0, 0]], rim])
-    closed = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]]
-    for left_out in range(4):
-        surface = Surface(vertices, closed[:left_out] + closed[left_out + 1 :])
-        for face, side, way in product(range(3), (-1, 1), WAYS):
-            assert surface.first(Start(place(0, 0, 0), face), way, side) == [First(None, -1, ())]
-    surface = Surface(vertices, closed)
-    assert all(surface.first(Start(place(0, 0, 0), f), (0, 0, 1), -1)[0].face == 0 for f in range(4))
-
-
 def test_where_faces_cross_each_region_has_its_answer():
     """A wall stands on the middle of a floor: above the floor there are two regions."""
     corners = np.array([[-4, -4, 0], [4, -4, 0], [0, 8, 0], [0, -2, 0], [0, 2, 0], [0, 0, 4]], float)
@@ -261,37 +183,6 @@ def test_cells_and_parity_tell_the_regions_of_a_closed_fan_apart_alike(seed):
     for face, way, side in product(range(len(cones)), ways, (-1, 1)):
         if any(way):
             assert stopped(regions, face, way, side, False) == stopped(fan, face, way, side, False)
-
-
-def test_a_fan_of_many_faces_and_what_is_none():
-    count = 60
-    angles = np.arange(count) * 2 * np.pi / count
-    rim = np.stack([np.cos(angles), np.sin(angles), -np.ones(count)], 1)
-    vertices = np.concatenate([[[0, 0, 0]], rim])
-    faces = [[0, 1 + k, 1 + (k + 1) % count] for k in range(count)]
-    surface = Surface(vertices, faces)
-    for face in (0, 17):
-        start = Start(place(0, 0, 0), face)
-        assert surface.first(start, (0.1, 0.2, -1), -1) == [First(None, -1, ())]
-        assert surface.first(start, (0.1, 0.2, -1), 1) == [First(ZERO, 0, (0,))]
-        assert surface.first(start, (3, 0.2, -1), 1) == [First(None, -1, ())]
-        assert surface.first(start, rim[5], 1) == surface.first(start, rim[5], -1) == [First(None, -1, ())]
-    cones = [cone_at(face, [(0, 0, 0), (1, 0, 0), (0, 1, 0)], sides) for face, sides in [(0, (True, False, True))]]
-    for wrong, said in (
-        (cones, "each beside two others"),
-        ([cone_at(0, [(0, 0, 0), (1, 0, 0), (0, 1, 0)], (True, False, False))], "sectors at a corner"),
-        ([cone_at(0, [(0, 0, 0), (1, 0, 0), (0, 1, 0)], (False, False, False))], "sectors at a corner"),
-        (
-            star(5, np.random.default_rng(0))
-            + [
-                cone_at(9 + k, [(0, 0, 0), a, b], (True, False, True))
-                for k, (a, b) in enumerate(pairwise([(1, 0, 99), (0, 1, 99), (-1, -1, 99), (1, 0, 99)]))
-            ],
-            "one cycle",
-        ),
-    ):
-        with pytest.raises(ValueError, match=said):
-            Fan(wrong)
 
 
 def test_places_are_nearest_and_those_who_hold_them_are_at_no_distance():

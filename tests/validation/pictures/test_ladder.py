@@ -45,18 +45,6 @@ def test_a_rung_that_adds_nothing_is_left_out_with_its_reason() -> None:
     assert left_out["shadows"].startswith("it is the scene as it is already")
 
 
-def test_without_lights_only_what_needs_none_is_left() -> None:
-    found, left_out = ladder.rungs(GLASS.altered(lights=()))
-    assert [rung.name for rung in found] == ["mirrors", "glass", "everything"]
-    assert {left_out[name] for name in ("diffuse", "highlights", "shadows")} == {"the scene has no lights"}
-
-
-def test_unused_materials_make_no_rung() -> None:
-    stairs = load_scene(SCENES / "stairs.toml")
-    more = stairs.altered(materials=stairs.materials | GLASS.materials)
-    assert [rung.name for rung in ladder.rungs(more)[0]] == ["diffuse", "everything"]
-
-
 def test_shadows_come_with_the_scenes_own_lights() -> None:
     sun = DirectionalLight(direction=(0.0, -1.0, 0.0))
     names = {rung.name: rung.scene for rung in ladder.rungs(GLASS.altered(lights=(sun,)))[0]}

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from cases import cases
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from scipy.stats import norm
 
 from renderer.scene.scene import Scene, load_scene
 from validation.gates import Gate
@@ -59,13 +58,6 @@ def test_pixels_without_scatter_must_agree_to_float32() -> None:
     assert scatter_of(one + 2e-6, paths, (4, 16, 64)).p_value > 0.9
     one[35:] += 1e-3  # in the second, shorter group
     assert scatter_of(one, paths, (4, 16, 64)).p_value < 1e-4
-
-
-@pytest.mark.parametrize("tests", [1, 100, 10_000])
-def test_sidak_keeps_five_percent_for_all_tests_together(tests: int) -> None:
-    z = float(norm.isf((1.0 - 0.95 ** (1.0 / tests)) / 2.0))
-    assert monte_carlo.sidak(z, tests) == pytest.approx(0.05, rel=1e-9)
-    assert monte_carlo.sidak(0.0, tests) == 1.0
 
 
 # A picture of ours
@@ -142,20 +134,6 @@ def test_a_sound_picture_passes_and_its_record_is_drawn() -> None:
 def test_a_defect_of_the_glass_turns_gates_red(monkeypatch: pytest.MonkeyPatch, ours: Scene, red: set[int]) -> None:
     _, gates = judged(monkeypatch, ours)
     assert red <= {i for i, gate in enumerate(gates) if not gate.passed}
-
-
-def test_too_little_glass_is_left_out_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(monte_carlo, "_PIXELS", 5000)
-    record, gates = monte_carlo.run(GLASS, "a", True)
-    assert gates == [] and record["paths"] == []
-    assert "of 96 x 96, and the error's slope needs 5000" in record["left_out"][0]
-
-
-def test_constant_transmission_is_left_out_by_name() -> None:
-    through = GLASS.materials["red"].model_copy(update={"transmittance": (0.5, 0.0, 0.0)})
-    opaque, left_out = monte_carlo._without_transmission(GLASS.altered(materials=GLASS.materials | {"red": through}))
-    assert left_out == ["materials.red: transmittance"]
-    assert opaque.materials == GLASS.materials
 
 
 def test_a_scene_without_glass_is_refused() -> None:

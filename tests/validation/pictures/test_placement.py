@@ -68,21 +68,6 @@ def test_normals_weighted_by_area_are_seen(tmp_path: Path, monkeypatch: pytest.M
     assert verdicts(scene) == [True, False]
 
 
-def test_what_leaves_a_choice_is_left_out_and_said(tmp_path: Path) -> None:
-    mirrored, _ = placement.check("small", scene_of(tmp_path, scale="[-1, 1, 1]"))
-    assert mirrored["left_out"] == {"objects.0, normals": "it is mirrored"}
-    flat = np.concatenate([icosphere(1).faces, [[0, 1, 0]]])
-    degenerate, gates = placement.check("small", scene_of(tmp_path, faces=flat))
-    assert degenerate["left_out"] and all(gate.passed for gate in gates)
-
-
-def test_a_mesh_from_no_file_is_left_out(tmp_path: Path) -> None:
-    scene = scene_of(tmp_path)
-    made = scene.objects[0].model_copy(update={"mesh": icosphere(1)})
-    record, gates = placement.check("small", scene.model_copy(update={"objects": (made,)}))
-    assert gates == [] and "no file" in record["left_out"]["objects.0"]
-
-
 def test_quads_whose_triangles_trimesh_puts_elsewhere_are_judged_by_their_places(tmp_path: Path) -> None:
     corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 2)]
     lines = [f"v {x} {y} {z}" for x, y, z in corners] + ["f 1 2 4 3", "f 1 2 6", "f 5 6 8 7", "f 3 4 8"]

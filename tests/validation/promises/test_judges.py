@@ -1,13 +1,11 @@
 """Who judges the public names: a name without a judge and a judge without a name turn a gate red."""
 
-from argparse import ArgumentParser
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import pytest
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from pydantic import BaseModel
 
 from validation.gates import Gate
 from validation.promises import judges, names, section
@@ -101,66 +99,9 @@ def test_none(): ...
     }
 
 
-def test_a_name_that_is_not_written_out_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "test_it.py").write_text("pytestmark = pytest.mark.judges(NAME)\n")
-    with pytest.raises(ValueError, match="malformed node"):
-        marked(tmp_path)
-
-
 def test_every_public_name_has_a_judge_and_every_judge_a_public_name() -> None:
     """The checks of the suite are not run here; what they would judge stands beside them."""
     tests = set(marked(judges.ROOT / "tests"))
     checks = [*section.HITS.values(), *section.QUERIES.values(), *section.PICTURES.values(), *holds.CHECKS.values()]
     judged = tests.union(*(check.judged for check in checks))
     assert judged == set(names.public_names())
-
-
-def test_keys_of_a_file_are_those_of_its_tables() -> None:
-    class Round(BaseModel):
-        type: Literal["round"] = "round"
-        radius: float
-
-    class Flat(BaseModel):
-        type: Literal["flat"] = "flat"
-
-    class Place(BaseModel):
-        x: float
-
-    class File(BaseModel):
-        places: dict[str, Place]
-        bodies: tuple[Round | Flat, ...] = ()
-
-    assert list(names._keys(File, "file")) == [
-        "file.places", "file.places.x", "file.bodies",
-        "file.bodies.round.type", "file.bodies.round.radius", "file.bodies.flat.type",
-    ]  # fmt: skip
-
-
-def test_options_are_those_of_each_command() -> None:
-    parser = ArgumentParser("p")
-    parser.add_argument("--version", action="version")
-    command = parser.add_subparsers().add_parser("draw")
-    command.add_argument("scene")
-    command.add_argument("-o", "--output")
-    assert list(names._options(parser, "p")) == ["p --version", "p draw", "p draw scene", "p draw --output"]
-
-
-class Base:
-    def inherited(self) -> None: ...
-
-    @property
-    def size(self) -> int: ...
-
-
-class Derived(Base):
-    field: int
-
-    @classmethod
-    def made(cls) -> None: ...
-
-    def _own(self) -> None: ...
-
-
-def test_members_are_public_methods_and_properties_inherited_ones_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(names.renderer, "__name__", __name__.partition(".")[0])
-    assert names._members(Derived) == {"inherited", "size", "made"}

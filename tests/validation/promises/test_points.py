@@ -1,7 +1,6 @@
 """Each check of what points and piles are told finds nothing in the sound renderer, and finds what is broken."""
 
 from collections.abc import Callable
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -10,9 +9,7 @@ from cases import cases
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
-from validation.oracle.distance import squared_distance
-from validation.oracle.vectors import relative, volume
-from validation.promises.queries import angles, edges, heaps, inside, nearest, piles, series, signed, views
+from validation.promises.queries import angles, edges, inside, nearest, piles, series, signed, views
 
 CHECKS: dict[str, Callable[[np.random.Generator], list[dict[str, Any]]]] = {
     "inside": inside.check_inside,
@@ -27,8 +24,8 @@ CHECKS: dict[str, Callable[[np.random.Generator], list[dict[str, Any]]]] = {
 }
 
 
-def rows(name: str, seed: int = 5) -> list[dict[str, Any]]:
-    return CHECKS[name](np.random.default_rng(seed))
+def rows(name: str) -> list[dict[str, Any]]:
+    return CHECKS[name](np.random.default_rng(5))
 
 
 def broken(name: str) -> set[str]:
@@ -36,10 +33,9 @@ def broken(name: str) -> set[str]:
     return {" ".join(row["promise"].split()[:3]) for row in rows(name) if row["broken"]}
 
 
-@cases("seed", [5, 6])
 @cases("name", CHECKS)
-def test_the_sound_renderer_keeps_all_promises(name: str, seed: int) -> None:
-    found = rows(name, seed)
+def test_the_sound_renderer_keeps_all_promises(name: str) -> None:
+    found = rows(name)
     assert found and all(row["asked"] > 0 for row in found)
     assert [row["promise"] for row in found if row["broken"]] == []
     assert len({row["promise"] for row in found}) == len(found)
@@ -112,28 +108,6 @@ def test_hits_in_another_order_and_places_are_found(monkeypatch: pytest.MonkeyPa
             assert broken("piles") == {"all hits of"}
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_tetrahedra_of_all_sizes_have_points_on_them(seed: int) -> None:
-    on, beside = 0, 0
-    for faces, points in heaps.heaps(np.random.default_rng(seed)):
-        for point in points.tolist():
-            told = [volume(face) == 0 and inside.lies_on(face) for face in relative(point, faces.tolist())[0]]
-            on, beside = on + any(told), beside + (not any(told))
-    assert on > 100 and beside > 100
-
-
-def test_whole_numbers_know_a_corner_an_edge_and_a_face() -> None:
-    face = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]])
-    squares = {(0.25, 0.25, 2.0): 4, (0.5, -1.0, 0.0): 1, (-3.0, -4.0, 0.0): 25, (1.0, 1.0, 0.0): 0.5}
-    for point, square in squares.items():
-        (corners,), unit = relative(point, face.tolist())
-        assert squared_distance((0, 0, 0), corners) / unit**2 == Fraction(square)
-    assert angles.turns(np.array([0.25, 0.25, -1e-300]), face) == pytest.approx(0.5)
-    # Above a corner with a right angle, from outside: an eighth of all directions at most.
-    assert angles.turns(np.array([0.0, 0.0, 1e-300]), face) == pytest.approx(-0.125)
-    assert angles.turns(np.array([0.25, 0.25, 0.0]), face) == 0.0
-
-
 def test_a_sign_that_is_lost_beyond_the_limit_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     changed(monkeypatch, "signed_distance", lambda found: np.where(np.isinf(found), np.inf, found))
     assert broken("signed") == {"beyond its limit"}
@@ -147,7 +121,7 @@ def test_the_other_sign_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_ball_that_hides_itself_and_one_that_hides_nothing_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as patch:
         changed(patch, "visible", lambda found: found & False)
-        assert broken("views") == {"a ball's centre", "what is in", "a point sees", "each pair of"}
+        assert broken("views") == {"a ball's centre", "what is in", "what is nearer", "a point sees", "each pair of"}
     changed(monkeypatch, "visible", lambda found: found | True)
     assert broken("views") == {"nothing is seen", "what is in", "a point sees", "each pair of"}
 

@@ -2,24 +2,20 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from cases import cases
 
-from renderer import octree
 from renderer.diagnostics import tree_boxes
-from renderer.mesh import ears, obj, polygons
+from renderer.mesh import obj, polygons
 from renderer.octree import Octree
 from renderer.picture import image, pack, prepare
 from renderer.queryable import Queries
 from renderer.results import hits
 from renderer.scene import scene
-from renderer.scene.camera import PerspectiveCamera
 from renderer.trace.layout import Tree
-from renderer.tree import refit
 from validation.promises.hits import (
     alone,
     batches,
@@ -37,7 +33,6 @@ from validation.promises.hits import (
     starts,
     trees,
 )
-from validation.promises.hits.ways import ways
 from validation.promises.pictures import (
     bounces,
     cameras,
@@ -97,18 +92,6 @@ def broken(name: str) -> set[str]:
     return {" ".join(row["promise"].split()[:2]) for row in CHECKS[name]() if row["broken"]}
 
 
-def test_points_a_little_off_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    sound = hits.points_on
-    monkeypatch.setattr(hits, "points_on", lambda *given: sound(*given) * (1.0 + 1e-9))
-    assert broken("places") == {"points are"}
-
-
-def test_normals_of_the_other_side_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    sound = hits.face_normals
-    monkeypatch.setattr(hits, "face_normals", lambda corners: -sound(corners))
-    assert broken("places") == {"normals have"}
-
-
 def test_bounds_that_are_open_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     sound = Octree.closest_hit
 
@@ -117,18 +100,6 @@ def test_bounds_that_are_open_are_found(monkeypatch: pytest.MonkeyPatch) -> None
 
     monkeypatch.setattr(Octree, "closest_hit", shrunk)
     assert "[t_min, t_max]" in broken("bounds")
-
-
-def test_a_bound_without_the_last_rounding_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    sound = Octree.all_hits
-
-    def narrow(self: Octree, *given: Any, **options: Any) -> Any:
-        found = sound(self, *given, **options)
-        found.t_error[:] = np.where(found.t < 2.0**-1000, found.t * 2.0**-50, found.t_error)
-        return found
-
-    monkeypatch.setattr(Octree, "all_hits", narrow)
-    assert broken("errors") == {"t_error bounds"}
 
 
 def test_a_start_on_its_face_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -141,30 +112,9 @@ def test_a_start_on_its_face_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     assert broken("starts") == {"a ray", "each query"}
 
 
-def test_a_row_of_another_ray_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    sound = Octree.any_hit
-
-    def shifted(self: Octree, *given: Any) -> Any:
-        answers = sound(self, *given)
-        return np.roll(answers, 1) if len(answers) == 1025 else answers
-
-    monkeypatch.setattr(Octree, "any_hit", shifted)
-    assert broken("batches") == {"batches of"}
-
-
 def test_a_refit_that_does_nothing_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Octree, "refit", lambda self, vertices: None)
     assert broken("refits") == {"a refit"}
-
-
-def test_leaves_that_a_refit_forgets_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(refit, "_fit_leaves", lambda *given: None)
-    assert "a leaf's" in broken("trees")
-
-
-def test_nodes_that_a_refit_forgets_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(refit, "_fit_nodes", lambda *given: None)
-    assert broken("trees") == {"a node's"}
 
 
 def altered(tree: Tree, change: Callable[[Any, Any, Any], None]) -> Tree:
@@ -214,31 +164,14 @@ def test_a_tree_that_is_altered_is_found(change: Any, expected: str, monkeypatch
     assert expected in broken("trees")
 
 
-def test_a_depth_overstated_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    octree = Octree(np.random.default_rng(5).normal(size=(900, 3)), np.arange(900).reshape(-1, 3))
-    octree.tree = replace(octree.tree, depth=octree.tree.depth + 1)
-    monkeypatch.setattr(trees, "_octrees", lambda rng: [octree])
-    assert broken("trees") == {"the depth"}
-
-
 def test_fans_over_notches_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(obj, "triangulate", lambda positions, corners, starts: polygons._fans(starts))
     assert broken("outlines") == {"triangles cover"}
 
 
-def test_ears_of_polygons_that_cross_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ears, "is_simple", lambda outline, order: True)
-    assert broken("outlines") == {"a polygon"}
-
-
 def test_boxes_beyond_the_best_hit_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tree_boxes, "_limit", lambda ray, t: np.inf)
     assert broken("openings") == {"a ray"}
-
-
-def test_boxes_of_another_level_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(openings, "boxes_at", lambda octree, level: tree_boxes.boxes_at(octree, level + 1))
-    assert broken("openings") == {"each level"}
 
 
 def test_scaling_in_another_order_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -253,23 +186,9 @@ def test_scaling_in_another_order_is_found(monkeypatch: pytest.MonkeyPatch) -> N
     assert "objects are" in broken("placing")
 
 
-def test_a_film_of_another_shape_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    sound = PerspectiveCamera.rows
-    monkeypatch.setattr(PerspectiveCamera, "rows", lambda self, width, height: sound(self, width, width))
-    assert broken("cameras") == {"the depth"}
-
-
 def test_samples_at_one_place_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(prepare, "sample_offsets", lambda samples: np.full((samples, 2), 0.5))
     assert broken("floors") == {"samples lie"}
-
-
-def test_each_way_asks_rays_once_and_streams_ask_neighbours_apart() -> None:
-    nobody: Any = "octree"
-    found = {name: batches_ for name, _, batches_ in ways(nobody, nobody, 1000)}
-    assert np.array_equal(np.sort(np.concatenate(found["in streams"])), np.arange(1000))
-    assert np.abs(np.diff(found["in streams"][0])).min() >= 97 and [len(b) for b in found["one by one"]] == [1] * 200
-    assert all(len(b) <= 9 for b in found["nine at a time"]) and len(found["in packets"][0]) == 1000
 
 
 def test_a_light_that_is_left_out_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -298,12 +217,6 @@ def test_a_tree_that_forgets_its_repairs_is_found(monkeypatch: pytest.MonkeyPatc
     assert broken("kept") == {"a loaded"}
 
 
-def test_a_hole_in_a_plane_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    sound = Octree.any_hit
-    monkeypatch.setattr(Octree, "any_hit", lambda *given: sound(*given) & (np.arange(len(given[2])) != 9))
-    assert broken("planes") == {"no ray"}
-
-
 def test_counts_of_places_and_of_padding_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     sound = counts.BruteForce.count_steps
 
@@ -317,37 +230,6 @@ def test_counts_of_places_and_of_padding_are_found(monkeypatch: pytest.MonkeyPat
     assert broken("counts") == {"stats counts", "brute force"}
 
 
-def test_a_box_too_many_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    sound = Octree.count_steps
-
-    def more(self: Any, *given: Any) -> Any:
-        steps = sound(self, *given)
-        return replace(steps, nodes=steps.nodes + (steps.nodes > 1))
-
-    monkeypatch.setattr(Octree, "count_steps", more)
-    assert broken("counts") == {"a ray"}
-
-
-def test_a_direction_that_is_refused_and_a_hit_at_infinity_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    sound = Octree.closest_hit
-
-    def strict(self: Any, origins: Any, directions: Any) -> Any:
-        if np.abs(directions).max() == 2.0**-300:
-            raise ValueError("directions: too short")
-        return sound(self, origins, directions)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Octree, "closest_hit", strict)
-        assert broken("limits") == {"directions are"}
-    monkeypatch.setattr(Octree, "any_hit", lambda self, origins, directions: np.ones(len(origins), np.bool_))
-    assert broken("limits") == {"a face"}
-
-
-def test_a_tree_over_the_callers_arrays_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(octree, "_checked_mesh", lambda mesh: mesh)
-    assert broken("kept") == {"a tree"}
-
-
 def test_codes_a_step_off_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     sound = image.srgb
     monkeypatch.setattr(codes, "srgb", lambda linear: sound(np.asarray(linear, np.float64) * (1.0 + 1e-9)))
@@ -357,68 +239,12 @@ def test_codes_a_step_off_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     assert broken("codes") == {"float32 numbers"}
 
 
-def test_placed_vertices_that_are_rounded_to_float32_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    sound = scene._place
-    monkeypatch.setattr(scene, "_place", lambda mesh, matrix: replace(
-        sound(mesh, matrix), vertices=sound(mesh, matrix).vertices.astype(np.float32)))  # fmt: skip
-    assert "placed float32" in broken("placing")
-
-
-def test_errors_of_another_ray_and_rays_too_many_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    sound, first, drawn = Octree.all_hits, Octree.closest_hit, bounces.render
-
-    def other(self: Any, *given: Any, **options: Any) -> Any:
-        found = sound(self, *given, **options)
-        return replace(found, t_error=found.t_error[::-1])
-
-    monkeypatch.setattr(Octree, "all_hits", other)
-    assert "t_error is" in broken("errors")
-
-    def wider(self: Any, *given: Any, **options: Any) -> Any:
-        found = first(self, *given, **options)
-        found.t_error = 2.0 * found.t_error + 1.0
-        return found
-
-    monkeypatch.setattr(Octree, "closest_hit", wider)
-    assert "t_error of" in broken("errors")
-    monkeypatch.setattr(bounces, "render", lambda *given, **options: replace(
-        drawn(*given, **options), rays=drawn(*given, **options).rays + 1))  # fmt: skip
-    assert broken("bounces") == {"rays are"}
-
-
-def test_another_last_bit_in_a_batch_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    sound = Octree.closest_hit
-
-    def off(self: Any, origins: Any, directions: Any) -> Any:
-        found = sound(self, origins, directions)
-        return replace(found, t=np.nextafter(found.t, np.inf)) if np.ndim(origins) == 2 else found
-
-    monkeypatch.setattr(Octree, "closest_hit", off)
-    assert broken("alone") == {"a ray"}
-
-
 def test_a_cosine_without_its_last_digits_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     def lossy(d: Any, n: Any, n1: float, n2: float) -> Any:
         return np.sqrt(max(1e-300, 1.0 - (n1 / n2) ** 2 * d[0] ** 2)), None
 
     monkeypatch.setattr(refraction, "refract", lossy)
     assert broken("refraction") == {"the cosine"}
-
-
-def test_arrays_that_get_lost_and_rays_in_another_order_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    with monkeypatch.context() as patch:
-        patch.setattr(kept.pickle, "loads", lambda stored: kept._mesh(np.random.default_rng(1), False))
-        patch.setattr(Octree, "refit", lambda self, vertices: None)
-        patch.setattr(kept, "refuses", lambda *given, **options: False)
-        assert broken("kept") == {"a mesh", "a refit", "damage anywhere", "files of"}
-    sound = Octree.closest_hit
-
-    def turned(self: Any, origins: Any, directions: Any, **bounds: Any) -> Any:
-        found = sound(self, origins, directions, **bounds)
-        return replace(found, t=found.t.T.reshape(found.t.shape))
-
-    monkeypatch.setattr(Octree, "closest_hit", turned)
-    assert broken("shapes") == {"rays of"}
 
 
 def test_planes_that_show_something_else_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -463,15 +289,6 @@ def test_files_that_are_understood_otherwise_are_found(monkeypatch: pytest.Monke
 
     monkeypatch.setattr(files, "load_mesh", other)
     assert broken("files") == {"an OBJ", "every second", "an index", "colours of"}
-
-
-def test_a_renderer_that_hits_nothing_is_judged_too() -> None:
-    """Judges of no hits at all had raised, and a defect that loses all of them was no red gate."""
-    none, points = np.empty(0), np.empty((0, 3))
-    exact = places._Exact(none, none, none, points, points, none.astype(bool))
-    hits_ = SimpleNamespace(t=none, u=none, v=none, points=points, normals=points)
-    assert all(kept.shape == (0,) and kept.dtype == bool for kept in places._judged(hits_, exact, 1.0).values())
-    assert errors._near(none, none, none.astype(np.int64), none.astype(np.int64)).dtype == bool
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # an infinity less itself, where a hit is lost

@@ -49,41 +49,6 @@ def test_the_smooth_component_is_diffuse_and_phong_on_both_sides(side: float) ->
     assert max(bsdf.eval(context(1), si, mi.Vector3f(*wo))) == 0.0
 
 
-def test_a_light_that_is_reflected_away_from_the_eye_gives_no_highlight() -> None:
-    even = PhongMirror(Phong(diffuse=0.0, specular=1.0, shininess=2.0))  # an even power hides the sign of R.V
-    seen = even.eval(mi.BSDFContext(), interaction((0.8, 0.0, 0.6)), mi.Vector3f(0.8, 0.0, 0.6))
-    assert max(seen) == 0.0
-
-
-def test_only_the_mirror_is_sampled() -> None:
-    si, anywhere = interaction((0.6, 0.0, -0.8)), mi.Point2f(0.3, 0.7)
-    drawn, weight = PhongMirror(SHINY).sample(mi.BSDFContext(), si, 0.1, anywhere)
-    np.testing.assert_allclose(drawn.wo, [-0.6, 0.0, -0.8], rtol=FLOAT32)
-    np.testing.assert_allclose(weight, SHINY.reflectance, rtol=FLOAT32)
-    assert mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Delta) and drawn.sampled_component == 1
-    for bsdf, component in ((PhongMirror(SHINY), 0), (PhongMirror(Phong()), 1)):
-        assert max(bsdf.sample(context(component), si, 0.1, anywhere)[1]) == 0.0
-
-
-def test_a_surface_says_which_components_it_has() -> None:
-    """An integrator samples lights only for smooth components, and paths only for the others."""
-    both = int(mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide)
-    smooth = int(mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.GlossyReflection) | both
-    mirror, refraction = (int(flag) | both for flag in (mi.BSDFFlags.DeltaReflection, mi.BSDFFlags.DeltaTransmission))
-    black = Phong(diffuse=(0.0, 0.0, 0.0))
-    for bsdf, flags in (
-        (PhongMirror(SHINY), smooth | mirror),
-        (PhongMirror(SHINY.model_copy(update={"reflectance": (0.0, 0.0, 0.0)})), smooth),
-        (PhongMirror(black.model_copy(update={"reflectance": (1.0, 1.0, 1.0)})), mirror),
-        (PhongMirror(black), 0),
-    ):
-        assert [int(bsdf.flags(i)) for i in range(bsdf.component_count())] == [smooth, mirror]
-        assert int(bsdf.flags()) == flags
-    glass = Glass(Dielectric(ior=1.5))
-    kinds = [int(glass.flags(i)) & (mirror | refraction) & ~both for i in range(glass.component_count())]
-    assert kinds == [int(mi.BSDFFlags.DeltaReflection), int(mi.BSDFFlags.DeltaTransmission)]
-
-
 def test_glass_draws_one_branch_or_the_one_that_is_asked_for() -> None:
     glass, si = Glass(Dielectric(type="dielectric")), interaction((0.0, 0.0, 1.0))
     drawn = [glass.sample(mi.BSDFContext(), si, u, mi.Point2f(0.5, 0.5))[0].wo.z for u in (0.039, 0.041)]
@@ -130,21 +95,6 @@ def test_path_and_recursion_agree_on_everything_but_glass() -> None:
     for part in ({"diffuse": 0.5}, {"ambient": 0.5}, {"specular": 0.1}, {"reflectance": 0.2}):
         assert np.abs(path(everything_but_glass(**part), 32, 24, max_depth=4) - b).max() > 0.01
     assert np.abs(path(scene, 32, 24, max_depth=1) - b).max() > 0.01
-
-
-@pytest.mark.parametrize("eye", [5.0, -5.0])
-def test_ambient_light_alone_is_seen_on_both_sides(eye: float) -> None:
-    quad = Mesh([[-9, 0, -9], [9, 0, -9], [9, 0, 9], [-9, 0, 9]], [[0, 1, 2], [0, 2, 3]])
-    scene = Scene.model_validate(
-        {
-            "camera": {"eye": (0.0, eye, 0.1), "target": (0.0, 0.0, 0.0)},
-            "materials": {"wall": {"diffuse": 0.0, "ambient": (0.1, 0.2, 4.0)}},
-            "objects": [{"mesh": quad, "material": "wall"}],
-            "ambient": (1.0, 0.5, 2.0),
-        }
-    )
-    expected = np.broadcast_to([0.1, 0.1, 8.0], (2, 2, 3))
-    np.testing.assert_allclose(path(scene, 2, 2, max_depth=0), expected, rtol=FLOAT32)
 
 
 def inside_glass() -> tuple[Scene, Any]:

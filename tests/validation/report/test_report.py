@@ -1,6 +1,5 @@
 """The page: it stands alone, shows each picture once, and says what the metrics say; the schema of the metrics."""
 
-import json
 import re
 import struct
 import zlib
@@ -8,8 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from cases import cases
-from jinja2 import UndefinedError
 
 from validation.gates import Gate
 from validation.report import page as report
@@ -75,30 +72,6 @@ def test_the_verdict_comes_first_and_names_what_fails(metrics: dict[str, Any], t
     assert "Mitsuba &lt;3&gt;" in page and "not named by --only" in page and "There is none." in page
 
 
-def test_an_extreme_case_is_found_by_its_number(
-    metrics: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The site links to it, see docs/case_links.py."""
-    monkeypatch.setitem(report.FIGURES, "stability_figures", lambda record: [])
-    said = dict.fromkeys(
-        ("construct", "expected", "ours", "embree_default", "embree_robust", "mitsuba", "tolerance"), "x"
-    )
-    cases = [said | {"number": number, "judges": ["exact"], "holds": True} for number in (3, 12)]
-    none: dict[str, list[object]] = {"meshes": [], "places": [], "builds": []}
-    page = report.page(metrics | {"stability": {"cases": cases, "watertight": none, "curves": {}}}, tmp_path)
-    assert re.findall(r'<tr id="([^"]*)"><td>(\d+)</td>', page) == [("case-3", "3"), ("case-12", "12")]
-
-
-def test_a_missing_picture_or_key_is_an_error(metrics: dict[str, Any], tmp_path: Path) -> None:
-    (tmp_path / "b.png").unlink()
-    with pytest.raises(FileNotFoundError, match=r"b\.png"):
-        report.page(metrics, tmp_path)
-    png(tmp_path / "b.png", 1)
-    del metrics["environment"]["platform"]
-    with pytest.raises(UndefinedError, match="platform"):
-        report.page(metrics, tmp_path)
-
-
 @pytest.mark.parametrize(
     ("key", "value", "where"),
     [
@@ -136,7 +109,6 @@ def test_metrics_are_read_as_they_were_written(metrics: dict[str, Any], tmp_path
 
 
 README = Path(__file__).parents[3] / "reports" / "README.md"
-TYPES: dict[str, Any] = {"3": int, "text": str, "bool": bool, "number": float, "table": dict, "list": list}
 
 
 def described() -> dict[str, tuple[str, str]]:
@@ -147,55 +119,11 @@ def described() -> dict[str, tuple[str, str]]:
     return {key: (kind, meaning) for keys, kind, meaning in rows for key in re.findall(r"`(\w+)`", keys)}
 
 
-def test_the_file_has_the_keys_and_types_that_the_readme_says(metrics: dict[str, Any]) -> None:
-    def refused(word: str) -> None:
-        pytest.fail(f"{word} is no JSON")
-
-    written = json.loads(schema.text(metrics), parse_constant=refused)
-    table = described()
-    assert set(written) <= set(table)
-    assert set(table) - set(written) == {key for key, (_, meaning) in table.items() if "absent where" in meaning} - {
-        "images"
-    }
-    for key, value in written.items():
-        assert type(value) is TYPES[table[key][0]], key
-    rows = {"verdict": written["verdict"], "facts": written["facts"][0], "matrix": written["matrix"][0]}
-    for key, row in {**rows, "gates": written["gates"][0], "thresholds": written["thresholds"]}.items():
-        assert set(row) == set(re.findall(r"`(\w+)`", table[key][1])), key
-    assert {"seconds", "costs"} <= set(written["images"])
-
-
 def test_every_key_of_the_schema_is_in_the_readme() -> None:
     keys = {field.alias or name for name, field in schema.Metrics.model_fields.items()}
     assert keys == set(described())
 
 
-@cases(
-    ("value", "text"),
-    [
-        (None, "–"),
-        (0.0, "0"),
-        (12345.0, "12,345"),
-        (0.99941, "0.9994100"),
-        (1.0 - 2**-40, "1 − 9e-13"),
-        (1.2345678, "1.235"),
-        (2e-7, "2.00e-07"),
-    ],
-)
-def test_numbers_for_people(value: float | None, text: str) -> None:
-    assert report.number(value) == text
-
-
 def test_a_failure_that_rounds_to_its_threshold_keeps_its_digits() -> None:
     nearly = Gate("images", "glass", "ssim", 1.0 - 2**-40, "at least", 1.0, "why").record()
     assert summary.failure(nearly) == "ssim is 0.9999999999990905, expected at least 1"
-
-
-def test_facts_count_what_the_gates_say() -> None:
-    def gate(quantity: str, value: float, bound: Any = "at most") -> dict[str, Any]:
-        return Gate("hits", "s", quantity, value, bound, 0.0, "why").record()
-
-    gates = [gate("rays on which we are wrong", 2.0), gate("of the exact sample, rays on which we are wrong", 1.0),
-             gate("leaks", float("nan")), gate("ssim", 0.9, "at least"), gate("ssim", 0.8, "at least")]  # fmt: skip
-    values = [fact["value"] for fact in summary.facts([], gates, None)]
-    assert values == [3.0, None, 0.8]

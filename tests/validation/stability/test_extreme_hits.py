@@ -8,7 +8,6 @@ import pytest
 from cases import cases
 
 from renderer import Hits, Mesh, Octree
-from validation.stability.cases import builds as extreme_builds
 from validation.stability.cases.case import ExtremeCase
 from validation.stability.cases.hits import CASES
 from validation.stability.cases.queries import crowded
@@ -87,22 +86,6 @@ def test_row_11_fails_where_the_interval_is_open(monkeypatch):
     assert not ROWS[11].run(True).holds
 
 
-def test_row_10_fails_where_bad_rays_pass(monkeypatch):
-    right = Octree.any_hit
-    monkeypatch.setattr(
-        Octree, "any_hit", lambda self, origins, directions: right(self, np.ones((5, 3)), np.ones((5, 3)))
-    )
-    assert not ROWS[10].run(True).holds
-
-
-def test_rows_1_20_and_25_look_at_any_hit_too(monkeypatch):
-    monkeypatch.setattr(Octree, "any_hit", lambda self, origins, directions: np.zeros(len(origins), np.bool_))
-    assert not ROWS[1].run(True).holds
-    assert not ROWS[20].run(True).holds
-    monkeypatch.setattr(Octree, "any_hit", lambda self, origins, directions: np.ones(len(origins), np.bool_))
-    assert not ROWS[25].run(True).holds
-
-
 @pytest.mark.parametrize("row", [26, 27])
 def test_bad_meshes_must_be_refused(monkeypatch, row):
     def mend(self):
@@ -112,38 +95,6 @@ def test_bad_meshes_must_be_refused(monkeypatch, row):
 
     monkeypatch.setattr(Mesh, "__post_init__", mend)
     assert not ROWS[row].run(True).holds
-
-
-@cases("row", [21, 22, 23, 32])
-def test_builds_that_copy_references_fail(monkeypatch, row):
-    right = Octree.stats.fget
-    monkeypatch.setattr(
-        Octree, "stats", property(lambda self: replace(right(self), references=8 * len(self.mesh.faces)))
-    )
-    assert not ROWS[row].run(True).holds
-
-
-def test_row_32_fails_on_a_wrong_hit_and_on_too_much_memory(monkeypatch):
-    monkeypatch.setattr(extreme_builds, "MEMORY_LIMIT_GB", 0.01)
-    assert not ROWS[32].run(True).holds
-    monkeypatch.undo()
-    some = np.arange(10_000) % 1000 == 0
-    broken(monkeypatch, lambda hits: replace(hits, t=np.where(some, hits.t * 1.001, hits.t)))
-    assert not ROWS[32].run(True).holds
-
-
-@pytest.mark.parametrize("name", ["distance", "face"])
-def test_row_53_fails_on_a_wrong_distance_or_face(monkeypatch, name):
-    right = Octree.closest_point
-
-    def spoiled(*arguments):
-        found = right(*arguments)
-        found.distance *= 1.0 + 2.0**-51 * (name == "distance")
-        found.face += name == "face"
-        return found
-
-    monkeypatch.setattr(Octree, "closest_point", spoiled)
-    assert not ROWS[53].run(True).holds
 
 
 @cases("query", ["contains", "count_hits", "all_hits", "winding_number", "signed_distance"])

@@ -1,7 +1,6 @@
 """Extreme cases 33 to 45, 47 and 48; their judges find each rule broken; no picture ever holds a NaN or inf."""
 
 import math
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from renderer.scene.scene import SceneObject
 from renderer.shade.shading import reflect, refract
 from renderer.trace.spawn import OffsetRule
 from validation.stability.cases.case import ExtremeCase
-from validation.stability.cases.refraction import critical_angle, nested_radiance, snell_residual, steep_indices
+from validation.stability.cases.refraction import critical_angle, snell_residual, steep_indices
 from validation.stability.cases.scenes import Vector, ball, eye_at, quad, scene_of
 from validation.stability.cases.shading import CASES
 from validation.stability.cases.spawned import missed_planes, self_hits, wrong_pixels
@@ -93,29 +92,6 @@ class TestJudgesFindABrokenRefraction:
         assert snell_residual(d, n, t, 1.0, 1.0) == pytest.approx(0.2 * 2.0**53, rel=1e-12)
 
 
-def test_open_mesh_is_left_into_what_is_around() -> None:
-    """A pane without a back, met from behind inside a closed block of another index: n1 is the pane's own."""
-    block = (box((-2, -2, -2), (2, 2, 2)), Dielectric(type="dielectric", ior=1.5, reflectance=0.0))
-    pane = (quad((1, 0, 0), (0, 5, 0), (0, 0, 5)), Dielectric(type="dielectric", ior=2.0, reflectance=0.0))
-    scene = scene_of(eye_at((0.1, 0.2, 0.3), (1, 0.2, 0.3)), block, pane, background=1.0)
-    value = float(render(scene, resolution=(1, 1), max_depth=4, threads=1).radiance[0, 0, 0])
-    # 2 to 1.5 at the pane and 1.5 to 1 at the block, straight on; float32.
-    assert value == pytest.approx((1 - (0.5 / 3.5) ** 2) * 0.96, rel=2.0**-23)
-
-
-def test_three_media_around_the_eye() -> None:
-    boxes = [box((-a, -a, -a), (a, a, a)) for a in (3.0, 2.0, 1.0)]
-    glass = [Dielectric(type="dielectric", ior=n, reflectance=0.0) for n in (1.3, 2.4, 1.1)]
-    seen = (1.1, 2.4, 1.3, 1.0)
-    expected = math.prod(1 - ((a - b) / (a + b)) ** 2 for a, b in pairwise(seen))
-    # The order in which the scene lists them does not matter.
-    for order in ((0, 1, 2), (2, 1, 0), (1, 2, 0)):
-        parts = [(boxes[i], glass[i]) for i in order]
-        scene = scene_of(eye_at((0.1, 0.2, 0.3), (6, 0.2, 0.3)), *parts, background=1.0)
-        value = float(render(scene, resolution=(1, 1), max_depth=4, threads=1).radiance[0, 0, 0])
-        assert value == pytest.approx(expected, rel=2.0**-23)
-
-
 @pytest.mark.parametrize("count", [8, 9, 10])
 def test_eight_media_are_remembered(count: int) -> None:
     """A ninth is left into the eighth, as it was entered. A tenth in it is entered from the eighth, not the ninth."""
@@ -130,12 +106,6 @@ def test_eight_media_are_remembered(count: int) -> None:
     crossed = [(indices[min(k, 8)], indices[k + 1]) for k in range(count)]
     expected = math.prod((1 - ((a - b) / (a + b)) ** 2) ** 2 for a, b in crossed)
     assert value == pytest.approx(expected, rel=2.0**-23)
-
-
-def test_nested_radiance_depends_on_the_media() -> None:
-    """The seven nestings of row 40 are told apart by their analytic values."""
-    values = [nested_radiance(*media, False)[1] for media in ((1.5, 1.0), (1.5, 1.33), (1.33, 1.5), (1.5, 2.4))]
-    assert np.diff(sorted(values)).min() > 1e-3
 
 
 def expect_finite(image: Image) -> None:
@@ -222,7 +192,7 @@ def scenes(draw: Any) -> Scene:
     )
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(scenes(), st.integers(0, 64), st.sampled_from([0.01, 0.1]), st.sampled_from(["bounded", "mitsuba", 0.0]))
 def test_no_picture_holds_a_nan_or_inf(scene: Scene, max_depth: int, min_weight: float, offset: Any) -> None:
     expect_finite(

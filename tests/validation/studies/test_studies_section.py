@@ -1,8 +1,5 @@
 """The section on studies: ours passes, and each kind of wrong answer turns a gate red."""
 
-from importlib import import_module
-from pathlib import Path
-
 import numpy as np
 import pytest
 from cases import cases
@@ -153,23 +150,3 @@ def test_what_does_not_hold_is_counted(monkeypatch, name):
     monkeypatch.setattr(holds, study, broken(getattr(holds, study)))
     row = holds.check(name)
     assert 0 < row["wrong"] <= row["asked"]
-
-
-def test_meshes_stand_apart_and_on_grids_that_move_exactly():
-    for mesh in (bodies.town(), bodies.terrain()):
-        points = holds._within(mesh)
-        assert ((mesh.vertices + holds.UTM) - holds.UTM == mesh.vertices).all()
-        assert ((points + holds.UTM) - holds.UTM == points).all()
-    # No face lies so near to a point that exact rays would begin behind it.
-    for mesh in bodies.bodies().values():
-        place = bits.face_points(mesh)
-        rows = np.random.default_rng(0).choice(len(place.points), 50, replace=False)
-        off = 4.0 * bits._BEGIN * mesh.extent.max()
-        for row in rows:
-            others = Octree(mesh.vertices, np.delete(mesh.faces, place.faces[row], axis=0))
-            assert others.closest_point(place.points[row]).distance > off
-
-
-def test_the_section_is_one_of_the_suites():
-    assert import_module("validation.sections").NAMES[3] == "studies"
-    assert Path(section.__file__).parent.name == "studies"

@@ -1,5 +1,6 @@
 """Defects of rays and hits."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ def _fill_rounded(sound: Any, vertices: Any, *rest: Any) -> Any:
 
 
 def _refit_leaving_blocks(sound: Any, tree: Any, *rest: Any) -> Any:
-    return sound(tree, *rest)._replace(blocks=tree.blocks)
+    return replace(sound(tree, *rest), blocks=tree.blocks)
 
 
 def _refit_leaving_upper_z(sound: Any, tree: Any, *rest: Any) -> Any:
@@ -113,8 +114,8 @@ _CHANGES: dict[str, Change] = {
     "bad rays are let through": Wrapped("closest.reject", lambda sound, *arguments: None),
     "places of hits off by 1e-9 of a corner": Wrapped("hits.points_on", _points_moved),
     "normals of hits turned inwards on half the faces": Wrapped("hits._normals", _normals_turned),
-    "u and v exchanged in packets": Rule("weights-of-hit", argument(2, "(_[0], _[1], _[3], _[2], _[4])")),
-    "single rays accept hits up to 1.0001 t_max": Rule("first-limit", element(0, "_ * 1.0001")),
+    "u and v exchanged in packets": Rule("weights-of-hit", argument(2, "Best(_.t, _.face, _.v, _.u, _.w)")),
+    "single rays accept hits up to 1.0001 t_max": Rule("first-limit", argument(0, "_ * 1.0001")),
     "the last ray of every full chunk is a miss": Wrapped("closest_hits", _closest_but_last_of_chunks),
     "a refit leaves each leaf's upper z": Wrapped("refit_tree", _refit_leaving_upper_z),
     "a refit counts in the units of the old size": Wrapped("refit_tree", _refit_in_old_units),

@@ -9,10 +9,10 @@ from validation.defects.edits import argument, call, choice, compare, value
 from validation.defects.seeded.defect import Defect
 
 
-def _first_direction_open(sound: Any, octree: Any, asked: Any, sky: Any, answers: Any) -> Any:
+def _first_direction_open(sound: Any, octree: Any, request: Any, sky: Any, answers: Any) -> Any:
     limits = np.array(sky.limits)
     limits[:1] = 0.0
-    return sound(octree, asked, sky._replace(limits=limits), answers)
+    return sound(octree, request, sky._replace(limits=limits), answers)
 
 
 def _mirrored_bytes(bits: Any) -> Any:
@@ -40,13 +40,11 @@ def _on_first_face(chosen: Any) -> Any:
 _CHANGES: dict[str, Change] = {
     "what lies at a point's horizon is open": Rule("open-above-horizon", compare(">=")),
     "the first direction of all is open": Wrapped("share.run", _first_direction_open),
-    "bits stand the other way round in their bytes": after("share.answer_bits", _mirrored_bytes),
+    "bits stand the other way round in their bytes": after("share.evaluate_bits", _mirrored_bytes),
     "rays of studies leave a face on its other side": Rule("side-of-study-ray", compare("<")),
     "the whole is without what the horizon hides": Rule("cosine-weight", call("abs", "max(_0, 0.0)")),
     "a list of leaves lacks its last one": Rule("end-of-leaf-list", argument(1, "max(_ - 1, 0)")),
-    "the leaf that hid a ray hides the next one unasked": Rule(
-        "hider-is-tested", value("(0.0, np.int32(0), 0.0, 0.0, 1.0, np.int64(0))")
-    ),
+    "the leaf that hid a ray hides the next one unasked": Rule("hider-is-tested", value("True")),
     "patches weigh the same at all heights": Rule("cosine-of-patches", value("False")),
     "distances in units of the directions": Wrapped("share.limits_of", _limits_in_directions),
     "every sun stands for an hour": Wrapped("sky.check_weights", _hours_alike),
@@ -60,7 +58,7 @@ _CHANGES: dict[str, Change] = {
     "a scanner on a roof stands below it": Rule("outer-side-of-scanner", choice(then="-_")),
     "points of a file lie on the first face": after("of_file", _on_first_face),
     "faces that hold the beginning of a view hide its end": Wrapped(
-        "visible.moved_off", lambda sound, rays, *rest: rays
+        "visible.offset_origins", lambda sound, rays, *rest: rays
     ),
 }
 STUDIES = tuple(Defect("studies", name, change) for name, change in _CHANGES.items())

@@ -10,7 +10,7 @@ from renderer.diagnostics.ray_step import Steps
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, icosphere
 from validation.pictures.explain import media
-from validation.pictures.explain.media import COINCIDING, OPEN, OVERLAPPING, MediaJudge, open_glass
+from validation.pictures.explain.media import COINCIDING, OPEN, OVERLAPPING, MediaJudge
 from validation.pictures.verdict import differs
 
 SIZE = (40, 30)
@@ -72,8 +72,3 @@ def test_a_stack_that_forgets_is_seen(monkeypatch: pytest.MonkeyPatch, why: str)
     # The picture is sound, and is not compared here.
     monkeypatch.setattr(media, "wrong_sum", lambda *_: [])
     assert any("by the rule the indices are" in (one.wrong or "") for one in judged(SCENES[why]))
-
-
-def test_open_glass_is_named() -> None:
-    assert open_glass(SCENES[OPEN]) == {"mesh (0)": len(LIDLESS.open_edges)}
-    assert open_glass(SCENES[OVERLAPPING]) == {}
