@@ -19,7 +19,6 @@ from renderer.mesh.shapes import box, icosphere, lattice_faces, torus
 from renderer.numerics.simd import local_doubles, offset, pointer
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.walk import stack_size
-from validation.references.igl import Igl
 from validation.stability.cases.queries.inside import closed_solids, points_at, winding_numbers
 
 pytestmark = pytest.mark.judges("BruteForce.winding_number", "Octree.contains", "Octree.winding_number")
@@ -185,14 +184,6 @@ def test_of_any_faces_it_is_within_the_tolerance(kind, seed, count, leaf_size):
     for tolerance in (0.3, 1e-3, 1e-8, 0.0):
         error = np.abs(octree.winding_number(points, tolerance) - expected).max()
         assert error <= tolerance + ROUNDING * len(mesh.faces)
-
-
-def test_it_is_that_of_libigl():
-    for mesh in OPEN.values():
-        points = around(mesh, np.random.default_rng(8), 200)
-        expected = Igl(mesh.vertices, mesh.faces).winding_number(points)
-        np.testing.assert_allclose(BruteForce.from_mesh(mesh).winding_number(points), expected, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(Octree.from_mesh(mesh).winding_number(points, 1e-5), expected, rtol=0, atol=1e-5)
 
 
 def test_of_a_disc_on_its_axis_analytically():
