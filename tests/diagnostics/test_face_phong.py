@@ -128,6 +128,7 @@ class TestStandIns:
         np.testing.assert_array_equal(got, colors_of(scene((icosphere(2), Phong(diffuse=grey)), floor)))
         assert got[:320].max() > 160
 
+
 def test_the_same_bits_for_any_number_of_threads() -> None:
     what = scene((icosphere(5), SHINY))  # three chunks
     np.testing.assert_array_equal(colors_of(what, threads=1), colors_of(what, threads=3))

@@ -46,7 +46,6 @@ def row(**changed: Any) -> Image:
 
 @pytest.mark.parametrize("aov", AOVS)
 class TestAll:
-
     def test_a_miss_shows_the_background(self, aov: str) -> None:
         image = ball()
         missed = false_color(image, aov)[image.face < 0]
@@ -145,6 +144,7 @@ class TestFaces:
         faces = [0, 1, 2, 99_999, 2**31 - 1]
         expected = [[48 + (lowbias32(f) >> shift & 255) * 207 // 255 for shift in (0, 8, 16)] for f in faces]
         assert self.colors(faces).tolist() == expected
+
 
 class TestCost:
     def test_from_few_to_many(self) -> None:

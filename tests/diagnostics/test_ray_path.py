@@ -137,13 +137,6 @@ def test_shipped_scenes(name: str) -> None:
     check_against_render(load_scene(SCENES / f"{name}.toml"), (5, 5), max_depth=4)
 
 
-def test_a_scene_where_nothing_bounces_has_no_bounces() -> None:
-    what = scene((icosphere(2), Phong()), lights=(DirectionalLight(direction=(0, -1, 0)),))
-    paths = paths_of(stage_of(what), (6, 6), max_depth=6)
-    assert {s.kind for path in paths for s in path} == {"camera", "shadow"}
-    check_against_render(what, (6, 6), max_depth=6)
-
-
 def test_a_mirror() -> None:
     what = scene((box(), Mirror(type="mirror", reflectance=(0.5, 0.25, 1.0))), background=(2, 4, 8))
     camera, reflected = ray_path(stage_of(what), (1.2, 3.0, 0.1), (-1, -2, 0), 3)

@@ -92,33 +92,17 @@ def test_every_pixel_is_written_once(resolution: tuple[int, int]) -> None:
     ("argument", "value", "got"),
     [
         ("accelerator", "bvh", "bvh"),
-        ("accelerator", None, "None"),
         ("split", "kd", "kd"),
         ("offset", "none", "none"),
-        ("offset", -1.0, "-1"),
         ("offset", 0.5, "0.5"),
         ("offset", float("nan"), "nan"),
-        ("offset", None, "None"),
-        ("offset", [1], "1"),
         ("threads", 0, "0"),
-        ("threads", -1, "-1"),
-        ("threads", 1.5, "1.5"),
         ("threads", True, "True"),
         ("resolution", (0, 4), "0"),
-        ("resolution", (4, 4, 4), "4"),
-        ("resolution", 4, "4"),
         ("resolution", (4, 1e9), "1000000000|16384"),
         ("samples", 3, "3"),
-        ("samples", -1, "-1"),
-        ("samples", True, "True"),
-        ("samples", "4", "4"),
-        ("max_depth", -1, "-1"),
         ("max_depth", 65, "65"),
-        ("max_depth", 1.5, "1.5"),
-        ("max_depth", float("nan"), "nan"),
-        ("min_weight", -0.1, "-0.1"),
         ("min_weight", 1.0, "1"),
-        ("min_weight", float("nan"), "nan"),
         ("shadows", 1, "1"),
         ("speed", 3, "speed"),
         ("camera", "x", "str"),
@@ -178,19 +162,6 @@ def test_an_exception_in_a_tile_stops_the_rest(monkeypatch: pytest.MonkeyPatch, 
     assert 5 <= len(tiles) <= 5 + 2 * threads
     monkeypatch.undo()
     assert render(ball(), resolution=(2 * TILE, TILE), threads=threads).rays.min() >= 1
-
-
-def test_each_tile_is_rendered_once_and_they_cover_the_film(monkeypatch: pytest.MonkeyPatch) -> None:
-    covered = np.zeros((2 * TILE + 7, 3 * TILE + 1), int)
-
-    def count(*arguments: Any) -> bool:
-        x0, y0, x1, y1 = arguments[-2]
-        covered[y0:y1, x0:x1] += 1
-        return True
-
-    monkeypatch.setattr(preparing, "render_tile", count)
-    render(ball(), resolution=covered.shape[::-1], threads=1)
-    assert (covered == 1).all()
 
 
 def test_concurrent_callers_get_the_same_picture() -> None:

@@ -54,15 +54,3 @@ def test_the_suns_are_those_of_the_shortest_day(example: ModuleType) -> None:
     assert np.degrees(np.arcsin(noon[2])) == pytest.approx(18.42, abs=0.05) and noon[1] < 0
     assert suns[0, 0] > 0 > suns[-1, 0]
     np.testing.assert_allclose(suns[:, 2], suns[::-1, 2])
-
-
-def test_houses_stand_apart_or_touch_and_hide_no_half_of_a_square(example: ModuleType) -> None:
-    rng = np.random.default_rng(example._SEED)
-    houses = [example._on_squares(house) for house in example._houses(rng, 400)]
-    assert len(houses) == 400
-    lower = np.array([house.corner for house in houses])
-    upper = lower + [house.size for house in houses]
-    inner = np.minimum(upper[:, None], upper) - np.maximum(lower[:, None], lower)
-    np.fill_diagonal(inner[:, :, 0], -1)
-    assert not (inner > 0).all(axis=2).any() and (upper > lower).all()
-    assert (np.concatenate([lower, upper]) % 2 == 0).all()

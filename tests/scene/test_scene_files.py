@@ -1,6 +1,5 @@
 """The committed scenes: all load and render, and the stairs are hit where they were built."""
 
-from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -89,24 +88,3 @@ def test_stairs_against_their_planes() -> None:
         kinds.add((*normal, round((o + t * d)[1], 6) if normal[1] else None))
     # Five treads and the floor by their heights, risers and the side.
     assert kinds == {(0, 1, 0, h) for h in (0, 0.5, 1, 1.5, 2, 2.5)} | {(1, 0, 0, None), (0, 0, 1, None)}
-
-
-def test_stairs_have_the_radiance_of_their_slopes() -> None:
-    """k_a I_a and, for any of the lights, k_d (N . L) E: nothing of the stairs' lit faces is in the shadow."""
-    scene = load_scene(SCENES / "stairs.toml")
-    image = render(scene, resolution=(64, 64), threads=1)
-    on_stairs, both = 0, 0
-    for y, x in np.argwhere(image.face >= 0):
-        material = scene.materials["stone" if image.face[y, x] < 44 else "ground"]
-        color = np.array(material.diffuse)  # type: ignore[union-attr]
-        terms = [color * scene.ambient]
-        for light in scene.lights:
-            towards = -np.array(light.direction) / np.linalg.norm(light.direction)  # type: ignore[union-attr]
-            terms.append(color * light.irradiance * max(0.0, image.normal[y, x] @ towards))  # type: ignore[union-attr]
-        # Every subset of lights may reach the floor, where the stairs cast their shadows.
-        subsets = [[terms[0], *c] for k in range(len(terms)) for c in combinations(terms[1:], k)] + [terms]
-        matches = [len(c) for c in subsets if np.allclose(image.radiance[y, x], sum(c), rtol=1e-6)]
-        assert matches
-        on_stairs += image.face[y, x] < 44
-        both += image.face[y, x] < 44 and np.allclose(image.radiance[y, x], sum(terms), rtol=1e-6)
-    assert on_stairs > 1500 and both > 0.5 * on_stairs

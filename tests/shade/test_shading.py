@@ -12,8 +12,6 @@ from cases import cases
 from hypothesis import given
 from hypothesis import strategies as st
 
-from renderer.mesh.shapes import icosphere
-from renderer.octree import Octree
 from renderer.shade.shading import fresnel, reflect, refract, specular
 from renderer.trace.spawn import BOUNDED, MITSUBA_EPSILON, OffsetRule, facet_of, offset_distance, spawn_origin
 
@@ -273,30 +271,3 @@ def test_mitsubas_rule() -> None:
     assert spawn_origin(p, 1e9, UP, (0.1, -0.9, 0.2), mitsuba) == (3.0, -5.0 - 6 * MITSUBA_EPSILON, 1.0)
     assert spawn_origin(p, 1e9, UP, away, OffsetRule(False, 0.0)) == p
     assert pytest.approx(8.940697e-05, rel=1e-7) == MITSUBA_EPSILON
-
-
-@cases("scale", [1e-6, 1.0, 1e6])
-@cases("shift", [0.0, 10.0])
-def test_reflected_rays_never_meet_a_convex_mesh_again(scale: float, shift: float) -> None:
-    vertices = (icosphere(3).vertices + shift) * scale
-    faces = icosphere(3).faces
-    octree = Octree(vertices, faces, threads=1)
-    rng = np.random.default_rng(8)
-    outside = rng.normal(size=(3000, 3))
-    outside = (outside / np.linalg.norm(outside, axis=1, keepdims=True) * 3.0 + shift) * scale
-    inner = rng.normal(size=(3000, 3))
-    inner = (inner / np.linalg.norm(inner, axis=1, keepdims=True) * 0.9 + shift) * scale
-    directions = inner - outside
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    hits = octree.closest_hit(outside, directions)
-    assert hits.hit.all()
-    points, normals = hits.points, hits.normals
-    starts, bounces = [], []
-    for i in range(len(outside)):
-        p0, p1, p2 = (vector(q) for q in vertices[faces[hits.face[i]]])
-        n, p, d = vector(normals[i]), vector(points[i]), vector(directions[i])
-        mirrored = reflect(d, n)
-        error, _ = offset_distance(p, p0, p1, p2, float(hits.u[i]), float(hits.v[i]), facet_of(p0, p1, p2, d))
-        starts.append(spawn_origin(p, error, n, mirrored, BOUNDED))
-        bounces.append(mirrored)
-    assert not octree.any_hit(starts, bounces).any()

@@ -94,13 +94,6 @@ def test_a_pixel_takes_its_rays_and_those_under_way() -> None:
         assert image.cut > 200
 
 
-def test_the_warning_tells_how_many_pixels_miss_rays() -> None:
-    with pytest.warns(CutWarning, match=r"[\d,]+ of 2,000 pixels miss rays: they took max_rays = 200 a sample"):
-        image = render(half_mirrors(), resolution=(50, 40))
-    cut = image.rays >= 200
-    assert 0 < image.cut <= cut.sum()
-
-
 def test_what_needs_fewer_rays_is_not_cut() -> None:
     """The same picture, and no warning: warnings are errors here."""
     whole = render(half_mirrors(5), resolution=(50, 40), max_rays=10**9)

@@ -11,10 +11,8 @@ from renderer.diagnostics.ray_path import MAX_RAYS, ray_path
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, grid, icosphere
 from renderer.picture.image import Image
-from renderer.picture.pack import pack
 from renderer.picture.prepare import prepare_scene
 from renderer.picture.render import render
-from renderer.picture.touching import find_touching
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.light import DirectionalLight
 from renderer.scene.material import Dielectric, Material, Mirror, Phong
@@ -283,15 +281,6 @@ class TestOneAnswer:
             for one, two in ((first.radiance, other.radiance), (first.face, other.face), (first.rays, other.rays)):
                 np.testing.assert_array_equal(one, two)
 
-    def test_numbers_of_faces_do_not_matter(self) -> None:
-        """But where the later of two bodies holds, or the colours of the first: not for one glass on the ground."""
-        parts = [(cube(0.0), GLASS), (level(0.0), GROUND), (box((0.5, 0, -0.5), (1.5, 1, 0.5)), GLASS)]
-        images = [
-            picture(scene(*(parts[k] for k in order), eye=EYES[0])) for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
-        ]
-        for image in images[1:]:
-            alike(image, images[0], 0.0)
-
     def test_mitsubas_offset_leaves_each_face_alone(self) -> None:
         two = [(slab(0, 1), clear(1.5)), (slab(1, 2), clear(1.5))]
         image = through(50, *two, offset="mitsuba")
@@ -327,11 +316,3 @@ class TestTouchingFaces:
 
     def test_faces_beside_each_other_do_not_touch(self) -> None:
         assert self.found((box(), GLASS), (box((1, 1, 0), (2, 2, 1)), GLASS)) == []
-
-    def test_none_where_nothing_refracts(self) -> None:
-        what = scene((box(), GROUND), (level(0.0), GROUND), eye=EYES[0])
-        prepared = prepare_scene(what, needs_of(what), "octree")
-        _, arrays = pack(what)
-        assert (
-            len(prepared.arrays.touching) == len(find_touching(prepared.tree, arrays, prepared.needs, 1).touching) == 0
-        )
