@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import at, get, put, smaller
+from renderer.numerics.simd import load, minimum, offset, store
 from renderer.trace.intersect import see_triangles
 from renderer.trace.layout import BLOCK_WORDS
 from renderer.trace.ray_lanes import CHILD, NUMBER, WIDTH, Prepared, shear_of
@@ -36,7 +36,7 @@ class Candidates(NamedTuple):
 @inlined
 def make_candidates(words):
     """``Candidates`` in memory for CANDIDATE_WORDS + WIDTH int64."""
-    return Candidates(words, at(words, TOGETHER * LISTED), at(words, TOGETHER * (LISTED + 1)))
+    return Candidates(words, offset(words, TOGETHER * LISTED), offset(words, TOGETHER * (LISTED + 1)))
 
 
 class _Query(NamedTuple):
@@ -57,9 +57,9 @@ def find_blocks(tree, rays, begin, end, scratch, found):
     count, query = end - begin, _Query(scratch.prepared, scratch.lanes, begin, found)
     clear_lanes(scratch.lanes)
     for k in range(count + WIDTH):
-        put(found.numbers, k, begin + smaller(k, count - 1))
+        store(found.numbers, k, begin + minimum(k, count - 1))
     for k in range(count):
-        put(found.counts, k, 0)
+        store(found.counts, k, 0)
     none, queue = LaneCounts(np.int64(0), np.int64(0), np.int64(0)), Queue(found.numbers, np.int64(0), count)
     following, rounds = run_lanes(
         tree, rays, scratch.prepared, scratch.lanes, none, queue, _ROUNDS, query, _see_leaves, _list_seen, _finish
@@ -71,19 +71,19 @@ def find_blocks(tree, rays, begin, end, scratch, found):
 def _see_leaves(tree, query, lanes, count):
     """Compute of each of ``count`` rays which faces it passes within, in the first block of its leaf."""
     for k in range(count):
-        r = get(lanes.at_leaf, k)
-        block = first_block(get(query.prepared.integers, CHILD + r))
+        r = load(lanes.at_leaf, k)
+        block = first_block(load(query.prepared.integers, CHILD + r))
         _, seen = see_triangles(tree, block * BLOCK_WORDS, shear_of(query.prepared, r))
-        put(lanes.bits, k, seen)
+        store(lanes.bits, k, seen)
 
 
 @inlined
 def _list_seen(tree, query, k):
     """List the block of the k-th ray at a leaf if it passes within a face."""
-    r, integers = get(query.lanes.at_leaf, k), query.prepared.integers
+    r, integers = load(query.lanes.at_leaf, k), query.prepared.integers
     # rule: seen-blocks
-    if get(query.lanes.bits, k) != 0:
-        _list_block(query.found, get(integers, NUMBER + r) - query.begin, first_block(get(integers, CHILD + r)))
+    if load(query.lanes.bits, k) != 0:
+        _list_block(query.found, load(integers, NUMBER + r) - query.begin, first_block(load(integers, CHILD + r)))
     return False
 
 
@@ -94,7 +94,7 @@ def _finish(tree, query, r):
 
 @inlined
 def _list_block(found, k, block):
-    count = get(found.counts, k)
-    put(found.counts, k, count + 1)
+    count = load(found.counts, k)
+    store(found.counts, k, count + 1)
     if count < LISTED:
-        put(found.blocks, k * LISTED + count, block)
+        store(found.blocks, k * LISTED + count, block)

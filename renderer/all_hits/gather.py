@@ -10,7 +10,7 @@ import numpy as np
 
 from renderer.all_hits.candidates import LISTED, TOGETHER, find_blocks, make_candidates
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import at, get, is_negative, lowest_bit, pointer, put, smaller
+from renderer.numerics.simd import is_negative, load, lowest_bit, minimum, offset, pointer, store
 from renderer.trace.best import NO_FACE, Best
 from renderer.trace.edge_signs import coordinate, exact_sides
 from renderer.trace.intersect import hit_in, hit_triangles, make_shear
@@ -77,7 +77,7 @@ def gather_chunk(descriptor, rays, begin, end, choice, counts, doubles, integers
     hits, rounds = np.int64(0), np.int64(0)
     # Where the candidates of rays were found, they are used: only hits end it between such rays.
     while begin < end and hits + rounds <= _WORK:
-        reached, taken = smaller(begin + TOGETHER, end), np.int64(0)
+        reached, taken = minimum(begin + TOGETHER, end), np.int64(0)
         if tree.has_nodes:
             reached, taken = find_blocks(tree, source, begin, reached, memory, candidates)
         rounds += taken
@@ -87,7 +87,7 @@ def gather_chunk(descriptor, rays, begin, end, choice, counts, doubles, integers
                 return i, -1
             hits += count
             # rule: max-hits
-            counts[i] = smaller(_ordered(tree, found, count, choice.contacts, choice.keep), choice.most)
+            counts[i] = minimum(_ordered(tree, found, count, choice.contacts, choice.keep), choice.most)
             if choice.keep:
                 _keep(found, kept, counts[i], tree.scale, make_shear(ray_at(source, i)[0]).direction_z)
                 kept += counts[i]
@@ -109,12 +109,12 @@ def _list_all(tree, rays, i, candidates, k, found, scratch):
     ray, t_max = ray_at(rays, i)
     if ray.leaving >= 0.0:
         return _list_from(tree, rays, i, ray, t_max, found, scratch)
-    query, listed = _Query(prepare_single(ray), t_max, found), get(candidates.counts, k)
+    query, listed = _Query(prepare_single(ray), t_max, found), load(candidates.counts, k)
     if not tree.has_nodes or listed > LISTED:
         return walk(tree, scratch.packet_stack, query, np.int64(0), _enter, _list_hits)
     count = np.int64(0)
     for place in range(k * LISTED, k * LISTED + listed):
-        count, _ = _list_hits(tree, query, get(candidates.blocks, place), 1, count)
+        count, _ = _list_hits(tree, query, load(candidates.blocks, place), 1, count)
     return count
 
 
@@ -155,7 +155,7 @@ def _add_hit(tree, query, count, hit, block, i, edges):
     if not query.single.ray.t_min <= hit.t <= query.t_max:
         return count
     if count < found.capacity:
-        face = np.int64(get(tree.faces, block * BLOCK_FACES + i))
+        face = np.int64(load(tree.faces, block * BLOCK_FACES + i))
         _list_hit(found, count, face, hit, block * BLOCK_WORDS + i, edges)
     return count + 1
 
@@ -165,7 +165,7 @@ def _list_from(tree, rays, i, ray, t_max, found, scratch):
     """``_list_all`` for a ray that leaves the surface. What stops it at its start are its first hits."""
     stack = scratch.packet_stack
     departure, stopped = depart(tree, rays.starts, i, ray, stack, scratch.holders)
-    ray, count, pile = departure.ray, np.int64(0), np.int64(get(at(rays.starts.rows, i * rays.starts.step), PILE))
+    ray, count, pile = departure.ray, np.int64(0), np.int64(load(offset(rays.starts.rows, i * rays.starts.step), PILE))
     for _ in range(departure.holders):
         if stopped.face == NO_FACE or t_max < 0.0:
             break
@@ -202,7 +202,7 @@ def _list_hits_from(tree, query, first, blocks, count):
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
-            face = get(tree.faces, block * BLOCK_FACES + i)
+            face = load(tree.faces, block * BLOCK_FACES + i)
             if np.float64(face) == ray.leaving:
                 continue
             if (near >> i) & 1 != 0:
@@ -225,25 +225,25 @@ def _edges_passed(sides):
 
 @inlined
 def _list_hit(found, i, face, hit, place, edges):
-    put(found.doubles, _row(found, _T, i), hit.t)
-    put(found.doubles, _row(found, _U, i), hit.u)
-    put(found.doubles, _row(found, _V, i), hit.v)
-    put(found.doubles, _row(found, _W, i), hit.w)
-    put(found.integers, _row(found, _FACE, i), face)
-    put(found.integers, _row(found, _AT, i), place)
-    put(found.integers, _row(found, _EDGES, i), edges)
+    store(found.doubles, _row(found, _T, i), hit.t)
+    store(found.doubles, _row(found, _U, i), hit.u)
+    store(found.doubles, _row(found, _V, i), hit.v)
+    store(found.doubles, _row(found, _W, i), hit.w)
+    store(found.integers, _row(found, _FACE, i), face)
+    store(found.integers, _row(found, _AT, i), place)
+    store(found.integers, _row(found, _EDGES, i), edges)
 
 
 @kernel
 def _ordered(tree, found, count, merge, sort):
     """Write the order of the listed hits, or of the contacts that they make, by t, then face; returns their number."""
-    order = at(found.integers, _row(found, _ORDER, 0))
+    order = offset(found.integers, _row(found, _ORDER, 0))
     if merge:
         _merge(tree, found, count, order)
     kept = 0
     for i in range(count):
-        put(order, kept, i)
-        kept += np.int64(get(found.integers, _row(found, _FACE, i)) != _MERGED)
+        store(order, kept, i)
+        kept += np.int64(load(found.integers, _row(found, _FACE, i)) != _MERGED)
     if sort:
         _sort(tree, found, order, kept, False)
     return kept
@@ -254,14 +254,14 @@ def _merge(tree, found, count, order):
     """Mark, of the hits at one edge or corner, all but the first as merged."""
     on_edges = 0
     for i in range(count):
-        put(order, on_edges, i)
-        on_edges += np.int64(get(found.integers, _row(found, _EDGES, i)) != 0)
+        store(order, on_edges, i)
+        on_edges += np.int64(load(found.integers, _row(found, _EDGES, i)) != 0)
     _sort(tree, found, order, on_edges, True)
     for k in range(1, on_edges):
         # Those of one place follow each other. The first one's place stands for all, merged or not.
         # rule: merge-at-edge
-        if _compare_places(tree, found, get(order, k - 1), get(order, k)) == 0:
-            put(found.integers, _row(found, _FACE, get(order, k)), np.int64(_MERGED))
+        if _compare_places(tree, found, load(order, k - 1), load(order, k)) == 0:
+            store(found.integers, _row(found, _FACE, load(order, k)), np.int64(_MERGED))
 
 
 @kernel
@@ -270,25 +270,25 @@ def _sort(tree, found, order, count, by_place):
     for start in range(count // 2 - 1, -1, -1):
         _sift(tree, found, order, start, count, by_place)
     for end in range(count - 1, 0, -1):
-        first = get(order, 0)
-        put(order, 0, get(order, end))
-        put(order, end, first)
+        first = load(order, 0)
+        store(order, 0, load(order, end))
+        store(order, end, first)
         _sift(tree, found, order, 0, end, by_place)
 
 
 @kernel
 def _sift(tree, found, order, parent, count, by_place):
     """Let an entry of a heap sink to its place."""
-    sinking = get(order, parent)
+    sinking = load(order, parent)
     while 2 * parent + 1 < count:
         child = 2 * parent + 1
-        if child + 1 < count and _precedes(tree, found, get(order, child), get(order, child + 1), by_place):
+        if child + 1 < count and _precedes(tree, found, load(order, child), load(order, child + 1), by_place):
             child += 1
-        if not _precedes(tree, found, sinking, get(order, child), by_place):
+        if not _precedes(tree, found, sinking, load(order, child), by_place):
             break
-        put(order, parent, get(order, child))
+        store(order, parent, load(order, child))
         parent = child
-    put(order, parent, sinking)
+    store(order, parent, sinking)
 
 
 @kernel
@@ -298,11 +298,11 @@ def _precedes(tree, found, i, j, by_place):
         compared = _compare_places(tree, found, i, j)
         if compared != 0:
             return compared < 0
-    ti, tj = get(found.doubles, _row(found, _T, i)), get(found.doubles, _row(found, _T, j))
-    place, other = get(found.integers, _row(found, _AT, i)), get(found.integers, _row(found, _AT, j))
+    ti, tj = load(found.doubles, _row(found, _T, i)), load(found.doubles, _row(found, _T, j))
+    place, other = load(found.integers, _row(found, _AT, i)), load(found.integers, _row(found, _AT, j))
     if place < 0 or other < 0:
         return place < other
-    face, other = get(found.integers, _row(found, _FACE, i)), get(found.integers, _row(found, _FACE, j))
+    face, other = load(found.integers, _row(found, _FACE, i)), load(found.integers, _row(found, _FACE, j))
     # rule: order-at-t
     return ti < tj or (ti == tj and face < other)
 
@@ -319,8 +319,8 @@ def _compare_places(tree, found, i, j):
 @kernel
 def _ends(tree, found, i):
     """The places in its block of the ends of a hit's edge, the lower first; of a corner, that twice."""
-    place = get(found.integers, _row(found, _AT, i))
-    edges = get(found.integers, _row(found, _EDGES, i))
+    place = load(found.integers, _row(found, _AT, i))
+    edges = load(found.integers, _row(found, _EDGES, i))
     # rule: corner-of-edges
     if edges & (edges - 1) != 0:
         # Two edges meet in the corner that is opposite to the third.
@@ -344,16 +344,19 @@ def _compare_corners(tree, a, b):
 @kernel
 def _keep(found, kept, count, scale, dz):
     """Append the first ``count`` hits in order to those kept, as ``write_hit`` writes a closest hit."""
-    t, u, v = (at(found.doubles, _row(found, OUT_T, kept)), at(found.doubles, _row(found, OUT_U, kept)),
-               at(found.doubles, _row(found, OUT_V, kept)))  # fmt: skip
-    face, side = at(found.integers, _row(found, OUT_FACE, kept)), at(found.integers, _row(found, OUT_SIDE, kept))
+    t, u, v = (offset(found.doubles, _row(found, OUT_T, kept)), offset(found.doubles, _row(found, OUT_U, kept)),
+               offset(found.doubles, _row(found, OUT_V, kept)))  # fmt: skip
+    face, side = (
+        offset(found.integers, _row(found, OUT_FACE, kept)),
+        offset(found.integers, _row(found, OUT_SIDE, kept)),
+    )
     for k in range(count):
-        i = get(found.integers, _row(found, _ORDER, k))
+        i = load(found.integers, _row(found, _ORDER, k))
         hit = Best(
-            get(found.doubles, _row(found, _T, i)),
-            get(found.integers, _row(found, _FACE, i)),
-            get(found.doubles, _row(found, _U, i)),
-            get(found.doubles, _row(found, _V, i)),
-            get(found.doubles, _row(found, _W, i)),
+            load(found.doubles, _row(found, _T, i)),
+            load(found.integers, _row(found, _FACE, i)),
+            load(found.doubles, _row(found, _U, i)),
+            load(found.doubles, _row(found, _V, i)),
+            load(found.doubles, _row(found, _W, i)),
         )
         write_hit(HitPointers(t, face, u, v, side, side, t), k, scale, hit, dz, False)

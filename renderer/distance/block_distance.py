@@ -8,7 +8,7 @@ they are wider, and still bounds.
 import numpy as np
 
 from renderer.jit.decorators import inlined
-from renderer.numerics.simd import least, magnitude, movemask, select, smaller, splat4, square_root
+from renderer.numerics.simd import fabs, minimum, movemask, reduce_min, select, splat4, square_root
 from renderer.trace.intersect import load_corners
 
 # Corners less the point, u, v and the nearest point err by 2^-53 each, of a corner's reach; together by 20 such errors
@@ -44,7 +44,7 @@ def bound_distances(tree, base, point, limit):
     # Of an unused place all is NaN, which is not within any limit.
     within = low <= splat4(limit)
     # rule: bound-of-block
-    limit = smaller(limit, least(select(within, high, splat4(np.inf))))
+    limit = minimum(limit, reduce_min(select(within, high, splat4(np.inf))))
     return movemask(within & (low <= splat4(limit))), low, limit
 
 
@@ -55,7 +55,7 @@ def _dot(ax, ay, az, bx, by, bz):
 
 @inlined
 def _size(x, y, z):
-    return magnitude(x) + magnitude(y) + magnitude(z)
+    return fabs(x) + fabs(y) + fabs(z)
 
 
 @inlined

@@ -20,7 +20,7 @@ from renderer.numerics.double_double import (
 )
 from renderer.numerics.expansions import OUT_OF_RANGE, PARTS, expand_area, expand_volume, pair_of
 from renderer.numerics.predicates import UNDECIDED, lies_within, volume_sign
-from renderer.numerics.simd import larger, put
+from renderer.numerics.simd import maximum, store
 
 # Shares of the terms of a sum of products of pairs, which errs by 2^-98 of them. Below CANCELLED it loses so many
 # digits that it is computed as an expansion. Below LOST its sign is in doubt: a point so near an edge, as seen along
@@ -96,7 +96,7 @@ def _on_or_beside(a, b, c, p, distance, parts):
     if on == 1:
         return 0.0
     if on == UNDECIDED or distance == 0.0:
-        put(parts, UNDECIDED_FLAG, 1.0)
+        store(parts, UNDECIDED_FLAG, 1.0)
     return distance
 
 
@@ -105,8 +105,8 @@ def _view_face(a, b, c, p):
     """The ``FaceView`` of a face from p."""
     reach, side = _TINIEST, _TINIEST
     for k in range(3):
-        reach = larger(reach, larger(larger(abs(a[k] - p[k]), abs(b[k] - p[k])), abs(c[k] - p[k])))
-        side = larger(side, larger(larger(abs(b[k] - a[k]), abs(c[k] - b[k])), abs(a[k] - c[k])))
+        reach = maximum(reach, maximum(maximum(abs(a[k] - p[k]), abs(b[k] - p[k])), abs(c[k] - p[k])))
+        side = maximum(side, maximum(maximum(abs(b[k] - a[k]), abs(c[k] - b[k])), abs(a[k] - c[k])))
     to_reach, to_side = 1.0 / power_below(reach), 1.0 / power_below(side)
     return FaceView(
         scaled_difference(a, p, to_reach), scaled_difference(b, p, to_reach), scaled_difference(c, p, to_reach),
@@ -118,7 +118,7 @@ def _view_face(a, b, c, p):
 @inlined
 def _largest(vector):
     """The largest component of a vector of pairs, without its sign."""
-    return larger(larger(abs(vector[0][0]), abs(vector[1][0])), abs(vector[2][0]))
+    return maximum(maximum(abs(vector[0][0]), abs(vector[1][0])), abs(vector[2][0]))
 
 
 @inlined
@@ -145,7 +145,7 @@ def _expanded(a, b, p, first, second, otherwise, parts):
     z = expand_area((a[0], a[1]), (b[0], b[1]), (p[0], p[1]), parts)
     z_pair = pair_of(parts, z)
     if x == OUT_OF_RANGE or y == OUT_OF_RANGE or z == OUT_OF_RANGE:
-        put(parts, UNDECIDED_FLAG, 1.0)
+        store(parts, UNDECIDED_FLAG, 1.0)
         return otherwise
     return _scaled(x_pair, first, second), _scaled(y_pair, first, second), _scaled(z_pair, first, second)
 
@@ -158,7 +158,7 @@ def _height(view, normal, a, b, c, p, parts):
     if abs(height[0]) < _CANCELLED * _largest(normal):
         count = expand_volume(a, b, c, p, parts)
         if count == OUT_OF_RANGE:
-            put(parts, UNDECIDED_FLAG, 1.0)
+            store(parts, UNDECIDED_FLAG, 1.0)
         else:
             height = _scaled(_scaled(pair_of(parts, count), view.to_side, view.to_reach), view.to_side, 1.0)
     return height if height[0] >= 0.0 else (-height[0], -height[1])

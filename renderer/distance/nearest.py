@@ -12,17 +12,16 @@ from renderer.distance.block_distance import bound_distances
 from renderer.distance.face_distance import UNDECIDED_FLAG, distance_to_face
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import (
-    at,
     extract,
-    get,
+    load,
     load4,
     local_doubles,
     lowest_bit,
+    minimum,
     movemask,
+    offset,
     pointer,
-    put,
     select,
-    smaller,
     splat4,
     store,
 )
@@ -106,26 +105,32 @@ def find_nearest(descriptor, points, rows, limits, out, integers, doubles, begin
     found, size = hit_pointers(out, out.shape[1]), len(integers) - LISTED
     children, near = pointer(integers), pointer(doubles)
     scratch = Scratch(
-        children, near, at(children, size), at(near, size), at(near, size + LISTED), at(near, size + LISTED + 8), parts
+        children,
+        near,
+        offset(children, size),
+        offset(near, size),
+        offset(near, size + LISTED),
+        offset(near, size + LISTED + 8),
+        parts,
     )
-    put(scratch.work, 0, 0.0)
+    store(scratch.work, 0, 0.0)
     for i in range(begin, count):
-        p, row = at(pointer(points), 3 * i), rows[i]
+        p, row = offset(pointer(points), 3 * i), rows[i]
         limit = limits[row if len(limits) > 1 else 0]
         # rule: point-in-tree-units
-        point = Point(0, 4, 8, tree.scale * get(p, 0), tree.scale * get(p, 1), tree.scale * get(p, 2))
-        put(parts, UNDECIDED_FLAG, 0.0)
-        near = _search(tree, point, smaller(limit * tree.scale * _MORE, _FARTHEST), scratch)
+        point = Point(0, 4, 8, tree.scale * load(p, 0), tree.scale * load(p, 1), tree.scale * load(p, 2))
+        store(parts, UNDECIDED_FLAG, 0.0)
+        near = _search(tree, point, minimum(limit * tree.scale * _MORE, _FARTHEST), scratch)
         distance, face = near.distance / tree.scale, near.face
         # rule: reach-is-closed
         hit = face != NO_FACE and distance <= limit
-        put(found.t, row, distance if hit else np.inf)
+        store(found.t, row, distance if hit else np.inf)
         # rule: lost-products
-        is_known = get(parts, UNDECIDED_FLAG) == 0.0 and _is_scaled(point, p, tree.scale)
-        put(found.face, row, np.int64((face if hit else -1) if is_known else UNDECIDED_FACE))
-        put(found.u, row, near.u if hit else np.nan)
-        put(found.v, row, near.v if hit else np.nan)
-        if get(scratch.work, 0) > WORK:
+        is_known = load(parts, UNDECIDED_FLAG) == 0.0 and _is_scaled(point, p, tree.scale)
+        store(found.face, row, np.int64((face if hit else -1) if is_known else UNDECIDED_FACE))
+        store(found.u, row, near.u if hit else np.nan)
+        store(found.v, row, near.v if hit else np.nan)
+        if load(scratch.work, 0) > WORK:
             return i + 1
     return count
 
@@ -137,23 +142,23 @@ def measure_faces(triangles, point, out):
     """
     parts, p = local_doubles(), three(pointer(point), 0)
     for i in range(len(triangles)):
-        put(parts, UNDECIDED_FLAG, 0.0)
-        base = at(pointer(triangles), 9 * i)
+        store(parts, UNDECIDED_FLAG, 0.0)
+        base = offset(pointer(triangles), 9 * i)
         out[i, 0], out[i, 1], out[i, 2] = distance_to_face(three(base, 0), three(base, 3), three(base, 6), p, parts)
-        out[i, 3] = 1.0 if get(parts, UNDECIDED_FLAG) == 0.0 else 0.0
+        out[i, 3] = 1.0 if load(parts, UNDECIDED_FLAG) == 0.0 else 0.0
 
 
 @inlined
 def _is_scaled(point, p, scale):
     """Whether the tree's units hold the coordinates at ``p`` exactly."""
-    return point.x / scale == get(p, 0) and point.y / scale == get(p, 1) and point.z / scale == get(p, 2)
+    return point.x / scale == load(p, 0) and point.y / scale == load(p, 1) and point.z / scale == load(p, 2)
 
 
 @kernel
 def _search(tree, point, limit, scratch):
     """The ``Nearest`` face within ``limit``."""
     query, none = _Query(point, scratch), Nearest(np.inf, np.int32(NO_FACE), 0.0, 0.0)
-    put(scratch.near, 0, 0.0)
+    store(scratch.near, 0, 0.0)
     found = walk_nearest_first(
         tree, scratch.children, query, _Found(none, np.int64(0), limit), _reaches, _enter, _visit
     )
@@ -162,7 +167,7 @@ def _search(tree, point, limit, scratch):
 
 @inlined
 def _reaches(query, k, found):
-    return get(query.scratch.near, k) <= _squared(found.limit)
+    return load(query.scratch.near, k) <= _squared(found.limit)
 
 
 @inlined
@@ -196,17 +201,17 @@ def _push_nearest_last(tree, node, bits, scratch, top):
     while bits != 0:
         i = lowest_bit(bits)
         bits &= bits - 1
-        square = get(scratch.squares, i)
-        put(scratch.near, top, square)
-        put(scratch.children, top, child_in(tree, node, i))
+        square = load(scratch.squares, i)
+        store(scratch.near, top, square)
+        store(scratch.children, top, child_in(tree, node, i))
         nearest, least = (top, square) if square < least else (nearest, least)
         top += 1
     last = top - 1
-    square, child = get(scratch.near, nearest), get(scratch.children, nearest)
-    put(scratch.near, nearest, get(scratch.near, last))
-    put(scratch.children, nearest, get(scratch.children, last))
-    put(scratch.near, last, square)
-    put(scratch.children, last, child)
+    square, child = load(scratch.near, nearest), load(scratch.children, nearest)
+    store(scratch.near, nearest, load(scratch.near, last))
+    store(scratch.children, nearest, load(scratch.children, last))
+    store(scratch.near, last, square)
+    store(scratch.children, last, child)
     return top
 
 
@@ -237,18 +242,18 @@ def _gap(nodes, row, x):
 def _list_faces(tree, query, first, count, found):
     """List the faces of some blocks that may be within the limit, and lower that to what they bound."""
     scratch, best, listed, limit = query.scratch, found.best, found.listed, found.limit
-    put(scratch.work, 0, get(scratch.work, 0) + count)
+    store(scratch.work, 0, load(scratch.work, 0) + count)
     for block in range(first, first + count):
         bits, low, limit = bound_distances(tree, block * BLOCK_WORDS, query.point, limit)
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
-            put(scratch.places, listed, block * BLOCK_FACES + i)
-            put(scratch.least, listed, extract(low, i))
+            store(scratch.places, listed, block * BLOCK_FACES + i)
+            store(scratch.least, listed, extract(low, i))
             listed += 1
             if listed == LISTED:
                 best = _settle(tree, query, _Found(best, listed, limit))
-                limit, listed = smaller(limit, best.distance * _MORE), np.int64(0)
+                limit, listed = minimum(limit, best.distance * _MORE), np.int64(0)
     return _Found(best, listed, limit)
 
 
@@ -259,12 +264,12 @@ def _settle(tree, query, found):
     """
     best, scratch, p = found.best, query.scratch, (query.point.x, query.point.y, query.point.z)
     for k in range(found.listed):
-        if get(scratch.least, k) > found.limit:
+        if load(scratch.least, k) > found.limit:
             continue
-        place = get(scratch.places, k)
-        put(scratch.work, 0, get(scratch.work, 0) + _MEASURE)
+        place = load(scratch.places, k)
+        store(scratch.work, 0, load(scratch.work, 0) + _MEASURE)
         base = (place // BLOCK_FACES) * BLOCK_WORDS + place % BLOCK_FACES
-        f = get(tree.faces, place)
+        f = load(tree.faces, place)
         a, b, c = corner(tree, base), corner(tree, base + 12), corner(tree, base + 24)
         d, u, v = distance_to_face(a, b, c, p, scratch.parts)
         # rule: equally-near

@@ -4,7 +4,7 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import cross_pairs, heads, power_below, scaled_difference
-from renderer.numerics.simd import pointer, smaller
+from renderer.numerics.simd import minimum, pointer
 from renderer.numerics.vec3 import (
     barycentric,
     cross,
@@ -150,7 +150,7 @@ def _along_longest(s0, s1, s2, w0, w1, w2, room):
     """
     l0, l1, l2 = length(s0), length(s1), length(s2)
     d0, d1, d2 = length(w0), length(w1), length(w2)
-    least = smaller(d0, smaller(d1, d2))
+    least = minimum(d0, minimum(d1, d2))
     if not least > room:
         return (1.0, 0.0, 0.0) if d0 == least else ((0.0, 1.0, 0.0) if d1 == least else (0.0, 0.0, 1.0))
     if l0 >= l1 and l0 >= l2:
@@ -167,4 +167,4 @@ def _along_longest(s0, s1, s2, w0, w1, w2, room):
 def _share_along(side, way, size):
     """How far along a side of some length its point lies that is nearest to the end of a way from its first corner."""
     along = dot(side, way) / size
-    return smaller(along / size, 1.0) if along > 0.0 else 0.0
+    return minimum(along / size, 1.0) if along > 0.0 else 0.0

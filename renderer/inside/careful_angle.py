@@ -16,7 +16,7 @@ from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import cross_pairs, heads, power_below, scaled_difference
 from renderer.numerics.expansions import OUT_OF_RANGE, expand_area, pair_of
 from renderer.numerics.predicates import UNDECIDED, balance, stretched, volume_sign
-from renderer.numerics.simd import larger
+from renderer.numerics.simd import maximum
 from renderer.numerics.vec3 import cross, dot, largest_component, length, scale, sub
 
 # The real part of a face's number, for directions of size one, above which float64 gives its angle: both parts err by
@@ -94,7 +94,7 @@ def _normal(a, b, p, parts):
 @kernel
 def _expand_normal(a, b, p, s, parts):
     """(a - p) x (b - p) times a number above 0 of points whose axes were stretched by s; NaN out of range."""
-    most = larger(larger(s[0], s[1]), s[2])
+    most = maximum(maximum(s[0], s[1]), s[2])
     x = _expand((a[1], a[2]), (b[1], b[2]), (p[1], p[2]), parts) * (s[0] / most)
     y = _expand((a[2], a[0]), (b[2], b[0]), (p[2], p[0]), parts) * (s[1] / most)
     z = _expand((a[0], a[1]), (b[0], b[1]), (p[0], p[1]), parts) * (s[2] / most)
@@ -110,7 +110,7 @@ def _expand(a, b, p, parts):
 @inlined
 def _largest(v):
     """The largest component without its sign; NaN where one is NaN or infinite."""
-    return larger(larger(abs(v[0]), abs(v[1])), abs(v[2])) + 0.0 * (v[0] + v[1] + v[2])
+    return maximum(maximum(abs(v[0]), abs(v[1])), abs(v[2])) + 0.0 * (v[0] + v[1] + v[2])
 
 
 @kernel
@@ -123,4 +123,4 @@ def _direction(a, p):
 @inlined
 def _near_one(a, p):
     """a - p times a power of two that brings its largest component near 1, which changes no angle."""
-    return scaled_difference(a, p, 1.0 / power_below(larger(largest_component(sub(a, p)), _TINIEST)))
+    return scaled_difference(a, p, 1.0 / power_below(maximum(largest_component(sub(a, p)), _TINIEST)))

@@ -15,18 +15,18 @@ from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.expansions import PARTS
 from renderer.numerics.predicates import UNDECIDED, area_sign, differ, lies_within, volume_sign
 from renderer.numerics.simd import (
-    at,
     count_bits,
-    get,
+    fabs,
+    load,
     load8,
     local_doubles,
     lowest_bit,
-    magnitude,
     movemask,
+    offset,
     pointer,
-    put,
     splat4,
     splat8,
+    store,
 )
 from renderer.trace.edge_signs import coordinate
 from renderer.trace.intersect import load_corners, round_down, round_up
@@ -92,19 +92,19 @@ def count_crossings(descriptor, points, axis, middle, rows, out, stack, begin):
     tree, parts = tree_pointers(descriptor), local_doubles()
     scale, axis_x, axis_y = tree.scale, (axis + 1) % 3, (axis + 2) % 3
     # Behind the expansion's parts.
-    work = at(parts, PARTS)
-    put(work, 0, 0.0)
+    work = offset(parts, PARTS)
+    store(work, 0, 0.0)
     for i in range(begin, len(points)):
-        row = at(pointer(points), 3 * i)
-        x, y, z = scale * get(row, axis_x), scale * get(row, axis_y), scale * get(row, axis)
+        row = offset(pointer(points), 3 * i)
+        x, y, z = scale * load(row, axis_x), scale * load(row, axis_y), scale * load(row, axis)
         ray = AxisRay(4 * axis_x, 4 * axis_y, 4 * axis, x, y, z, z >= middle)
-        if x / scale != get(row, axis_x) or y / scale != get(row, axis_y) or z / scale != get(row, axis):
+        if x / scale != load(row, axis_x) or y / scale != load(row, axis_y) or z / scale != load(row, axis):
             # The tree's units cannot hold it exactly.
             winding, on = np.int64(0), np.int64(UNDECIDED)
         else:
             winding, on = _search(tree, _Query(ray, parts), pointer(stack))
         out[rows[i]] = UNDECIDED_COUNT if on >= UNDECIDED else (ON_FACE if on else winding)
-        if get(work, 0) > WORK:
+        if load(work, 0) > WORK:
             return i + 1
     return len(points)
 
@@ -142,7 +142,7 @@ def _meet_boxes(nodes, base, ray):
 def _cross_blocks(tree, query, first, count, found):
     """``found`` and the crossings with the faces of some blocks."""
     ray, parts, winding, on = query.ray, query.parts, found.winding, found.on
-    put(parts, PARTS, get(parts, PARTS) + count)
+    store(parts, PARTS, load(parts, PARTS) + count)
     for block in range(first, first + count):
         base = block * BLOCK_WORDS
         sure, unsure, turns = _cross_block(tree, base, ray)
@@ -150,8 +150,8 @@ def _cross_blocks(tree, query, first, count, found):
         while unsure != 0:
             i = lowest_bit(unsure)
             unsure &= unsure - 1
-            if get(tree.faces, block * BLOCK_FACES + i) >= 0:
-                put(parts, PARTS, get(parts, PARTS) + _EXACTLY)
+            if load(tree.faces, block * BLOCK_FACES + i) >= 0:
+                store(parts, PARTS, load(parts, PARTS) + _EXACTLY)
                 step, touches = _cross_exactly(tree, base + i, ray, parts)
                 winding, on = winding + step, on | touches
     return _Crossings(winding, on)
@@ -167,7 +167,7 @@ def _cross_block(tree, base, ray):
     # On which side of each edge the ray passes, as far as rounding decides.
     a, b, c, d, e, f = x1 * y2, y1 * x2, x2 * y0, y2 * x0, x0 * y1, y0 * x1
     e0, e1, e2 = a - b, c - d, e - f
-    m0, m1, m2 = magnitude(a) + magnitude(b), magnitude(c) + magnitude(d), magnitude(e) + magnitude(f)
+    m0, m1, m2 = fabs(a) + fabs(b), fabs(c) + fabs(d), fabs(e) + fabs(f)
     zero, share, loss = splat4(0.0), splat4(_AREA_ERROR), splat4(_AREA_LOSS)
     r0, r1, r2 = m0 * share + loss, m1 * share + loss, m2 * share + loss
     above = (e0 > r0) | (e1 > r1) | (e2 > r2)
@@ -180,7 +180,7 @@ def _cross_block(tree, base, ray):
 
     # Whether the plane there lies above or below the point.
     volume = e0 * z0 + e1 * z1 + e2 * z2
-    terms = m0 * magnitude(z0) + m1 * magnitude(z1) + m2 * magnitude(z2)
+    terms = m0 * fabs(z0) + m1 * fabs(z1) + m2 * fabs(z2)
     error = terms * splat4(_VOLUME_ERROR) + splat4(_VOLUME_LOSS)
     over = movemask((left & (volume > error)) | (right & (zero - volume > error)))
     under = movemask((left & (zero - volume > error)) | (right & (volume > error)))

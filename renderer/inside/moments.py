@@ -23,7 +23,7 @@ from renderer.inside.multipoles import (
     sum_lanes,
 )
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import extract, get, larger, pointer, put, select, splat4, square_root
+from renderer.numerics.simd import extract, load, maximum, pointer, select, splat4, square_root, store
 from renderer.system.threads import for_chunks
 from renderer.trace.edge_signs import corner
 from renderer.trace.intersect import load_corners
@@ -109,12 +109,12 @@ def _measure_octants(descriptor, rows, scratch, begin, end):
             base, link = node * MOMENT_WORDS + place, child_in(tree, node, place)
             scratch.total[:] = 0.0
             if not _is_used(tree, node, place):
-                put(rows, base + 8 * X, _FAR)
-                put(rows, base + 8 * Y, _FAR)
-                put(rows, base + 8 * Z, _FAR)
-                put(rows, base + 8 * RADIUS, 0.0)
-                put(rows, base + 8 * SIZE, 0.0)
-                put(rows, base + 8 * SPREAD, 0.0)
+                store(rows, base + 8 * X, _FAR)
+                store(rows, base + 8 * Y, _FAR)
+                store(rows, base + 8 * Z, _FAR)
+                store(rows, base + 8 * RADIUS, 0.0)
+                store(rows, base + 8 * SIZE, 0.0)
+                store(rows, base + 8 * SPREAD, 0.0)
                 put_series(rows, base, scratch.total)
                 continue
             count = _list_leaves(tree, link, scratch)
@@ -127,7 +127,7 @@ def _measure_octants(descriptor, rows, scratch, begin, end):
 @inlined
 def _is_used(tree, node, place):
     """Whether an octant is not empty, by its box."""
-    return get(tree.nodes, node * NODE_WORDS + place) <= get(tree.nodes, node * NODE_WORDS + place + 8)
+    return load(tree.nodes, node * NODE_WORDS + place) <= load(tree.nodes, node * NODE_WORDS + place + 8)
 
 
 @kernel
@@ -154,14 +154,14 @@ def _measure(tree, scratch, count, rows, base):
     """Write what an octant's faces are like; returns their centre and radius."""
     first, _ = blocks_of(scratch.leaves[0])
     centre, size = _centre(tree, scratch, count, corner(tree, first * BLOCK_WORDS))
-    radius = larger(np.sqrt(_farthest(tree, scratch, count, centre)) * _MORE, _LEAST)
+    radius = maximum(np.sqrt(_farthest(tree, scratch, count, centre)) * _MORE, _LEAST)
     spread = _spread(tree, scratch, count, centre, 1.0 / (radius * radius))
-    put(rows, base + 8 * X, centre[0])
-    put(rows, base + 8 * Y, centre[1])
-    put(rows, base + 8 * Z, centre[2])
-    put(rows, base + 8 * RADIUS, radius)
-    put(rows, base + 8 * SIZE, size / (radius * radius) / (4.0 * math.pi))
-    put(rows, base + 8 * SPREAD, spread / size * _MORE if size > 0.0 else 0.0)
+    store(rows, base + 8 * X, centre[0])
+    store(rows, base + 8 * Y, centre[1])
+    store(rows, base + 8 * Z, centre[2])
+    store(rows, base + 8 * RADIUS, radius)
+    store(rows, base + 8 * SIZE, size / (radius * radius) / (4.0 * math.pi))
+    store(rows, base + 8 * SPREAD, spread / size * _MORE if size > 0.0 else 0.0)
     return centre, radius
 
 
@@ -192,7 +192,7 @@ def _farthest(tree, scratch, count, centre):
             for vertex in _faces(tree, block, centre):
                 square = _square(vertex)
                 most = select(square > most, square, most)
-    return larger(larger(extract(most, 0), extract(most, 1)), larger(extract(most, 2), extract(most, 3)))
+    return maximum(maximum(extract(most, 0), extract(most, 1)), maximum(extract(most, 2), extract(most, 3)))
 
 
 @kernel
@@ -257,7 +257,7 @@ def _add_faces(tree, link, centre, radius, scratch):
     first, count = blocks_of(link)
     unit = 1.0 / radius
     for place in range(first * BLOCK_FACES, (first + count) * BLOCK_FACES):
-        if get(tree.faces, place) >= 0:
+        if load(tree.faces, place) >= 0:
             at = (place // BLOCK_FACES) * BLOCK_WORDS + place % BLOCK_FACES
             a, b, c = corner(tree, at), corner(tree, at + 12), corner(tree, at + 24)
             d, e = _scaled(b, a, unit), _scaled(c, a, unit)
@@ -283,12 +283,15 @@ def _join_octants(descriptor, rows, scratch, begin, end):
             if child < 0:
                 continue
             base = node * MOMENT_WORDS + place
-            centre, radius = (get(rows, base), get(rows, base + 8), get(rows, base + 16)), get(rows, base + 8 * RADIUS)
+            centre, radius = (
+                (load(rows, base), load(rows, base + 8), load(rows, base + 16)),
+                load(rows, base + 8 * RADIUS),
+            )
             scratch.total[:] = 0.0
             for k in range(8):
                 if _is_used(tree, child, k):
                     at = child * MOMENT_WORDS + k
-                    get_series(rows, at, get(rows, at + 8 * RADIUS) / radius, scratch.other)
-                    shift = _scaled((get(rows, at), get(rows, at + 8), get(rows, at + 16)), centre, 1.0 / radius)
+                    get_series(rows, at, load(rows, at + 8 * RADIUS) / radius, scratch.other)
+                    shift = _scaled((load(rows, at), load(rows, at + 8), load(rows, at + 16)), centre, 1.0 / radius)
                     add_shifted(scratch.total, scratch.other, shift, scratch.work)
             put_series(rows, base, scratch.total)

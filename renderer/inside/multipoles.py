@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import extract, get, load4, movemask, put, select, splat4, square_root
+from renderer.numerics.simd import extract, load, load4, movemask, select, splat4, square_root, store
 
 # Even, for its power comes from squares. Of 4, 6 and 8 the quickest for tolerances from 1e-1 to 1e-3.
 ORDER = 6
@@ -178,10 +178,10 @@ def put_series(rows, base, series):
     factor = -1.0 / (4.0 * math.pi)
     for n in range(1, ORDER + 1):
         factor *= 2.0 * n - 1.0
-        put(rows, base + 8 * row_of(n, 0), factor * series[n, 0].real)
+        store(rows, base + 8 * row_of(n, 0), factor * series[n, 0].real)
         for m in range(1, n + 1):
-            put(rows, base + 8 * row_of(n, m), 2.0 * factor * series[n, m].real)
-            put(rows, base + 8 * row_of(n, m) + 8, 2.0 * factor * series[n, m].imag)
+            store(rows, base + 8 * row_of(n, m), 2.0 * factor * series[n, m].real)
+            store(rows, base + 8 * row_of(n, m) + 8, 2.0 * factor * series[n, m].imag)
 
 
 @kernel
@@ -191,7 +191,7 @@ def get_series(rows, base, ratio, series):
     for n in range(1, ORDER + 1):
         factor /= 2.0 * n - 1.0
         scale *= ratio
-        series[n, 0] = factor * scale * get(rows, base + 8 * row_of(n, 0))
+        series[n, 0] = factor * scale * load(rows, base + 8 * row_of(n, 0))
         for m in range(1, n + 1):
-            real, imaginary = get(rows, base + 8 * row_of(n, m)), get(rows, base + 8 * row_of(n, m) + 8)
+            real, imaginary = load(rows, base + 8 * row_of(n, m)), load(rows, base + 8 * row_of(n, m) + 8)
             series[n, m] = 0.5 * factor * scale * complex(real, imaginary)

@@ -13,9 +13,9 @@ from renderer.inside.careful_angle import careful_angle
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import (
     extract,
-    get,
+    fabs,
+    load,
     lowest_bit,
-    magnitude,
     movemask,
     select,
     splat4,
@@ -66,7 +66,7 @@ def add_blocks(tree, first, count, point, total, parts):
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
-            if get(tree.faces, block * BLOCK_FACES + i) >= 0:
+            if load(tree.faces, block * BLOCK_FACES + i) >= 0:
                 apart += _careful_angle(tree, base + i, point, parts)
         total = _times(total, select(sure, rest, splat4(1.0)), select(sure, volume, splat4(0.0)))
     return Turned(total.real, total.imaginary, total.turns, apart)
@@ -98,7 +98,7 @@ def _see_block(tree, base, point):
     # Of an unused place all is NaN, and of a corner at the point, so neither is sure.
     away = volume * volume + rest * rest >= splat4(_LEAST_SQUARE)
     away = away & ((share0 + share1) + share2 <= splat4(_NEAREST))
-    return rest, volume, away & ((rest > splat4(0.0)) | (magnitude(volume) > splat4(_LEAST_VOLUME)))
+    return rest, volume, away & ((rest > splat4(0.0)) | (fabs(volume) > splat4(_LEAST_VOLUME)))
 
 
 @inlined
@@ -116,7 +116,7 @@ def _times(total, a, b):
     over = (total.imaginary >= zero) & (b >= zero) & (y < zero)
     under = (total.imaginary < zero) & (b < zero) & (y >= zero)
     turns = total.turns + select(over, one, zero) - select(under, one, zero)
-    share = one / (magnitude(x) + magnitude(y))
+    share = one / (fabs(x) + fabs(y))
     return Turned(x * share, y * share, turns, total.apart)
 
 

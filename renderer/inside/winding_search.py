@@ -8,7 +8,7 @@ from renderer.arguments.limits import FARTHEST
 from renderer.inside.multipoles import MOMENT_WORDS, ROUNDING, see_octants, sum_lanes
 from renderer.inside.solid_angle import Turned, add_blocks, no_turn, turns_of
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import at, get, larger, local_doubles, pointer, smaller, splat4
+from renderer.numerics.simd import load, local_doubles, maximum, minimum, offset, pointer, splat4
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.point import Point
 from renderer.trace.walk import walk
@@ -38,7 +38,7 @@ def find_windings(descriptor, rows, points, tolerance, out, stack, begin, end):
     tree, rows, stack, parts = tree_pointers(descriptor), pointer(rows), pointer(stack), local_doubles()
     work, first_share = np.int64(0), _FIRST_SIDE if tolerance < 0.0 else _FIRST * tolerance
     for i in range(begin, end):
-        row = at(pointer(points), 3 * i)
+        row = offset(pointer(points), 3 * i)
         point = _point_at(tree, row)
         number, bound, share = 0.5, np.inf, first_share
         if not _is_held(tree, row, point):
@@ -46,7 +46,7 @@ def find_windings(descriptor, rows, points, tolerance, out, stack, begin, end):
         while _is_open(number, bound, tolerance) and share > ROUNDING and tree.has_nodes:
             number, bound, steps = _search(tree, _Query(rows, point, share, parts), stack)
             work += steps
-            share *= _NEXT_SIDE if tolerance < 0.0 else smaller(_LESS, _AIM * tolerance / bound)
+            share *= _NEXT_SIDE if tolerance < 0.0 else minimum(_LESS, _AIM * tolerance / bound)
         if _is_open(number, bound, tolerance):
             number = _all_faces(tree, point, parts)
             work += tree.count
@@ -64,14 +64,16 @@ def _is_open(number, bound, tolerance):
 
 @inlined
 def _point_at(tree, row):
-    x, y, z = tree.scale * get(row, 0), tree.scale * get(row, 1), tree.scale * get(row, 2)
+    x, y, z = tree.scale * load(row, 0), tree.scale * load(row, 1), tree.scale * load(row, 2)
     return Point(0, 4, 8, _within(x), _within(y), _within(z))
 
 
 @inlined
 def _is_held(tree, row, point):
     """Whether the tree's units hold a point exactly; far away they need not."""
-    return _keeps(tree, get(row, 0), point.x) & _keeps(tree, get(row, 1), point.y) & _keeps(tree, get(row, 2), point.z)
+    return (
+        _keeps(tree, load(row, 0), point.x) & _keeps(tree, load(row, 1), point.y) & _keeps(tree, load(row, 2), point.z)
+    )
 
 
 @inlined
@@ -82,7 +84,7 @@ def _keeps(tree, x, scaled):
 @inlined
 def _within(x):
     """No farther than products allow: so far away all winding numbers are 0 to 2^-100."""
-    return larger(-FARTHEST, smaller(FARTHEST, x))
+    return maximum(-FARTHEST, minimum(FARTHEST, x))
 
 
 class _Query(NamedTuple):

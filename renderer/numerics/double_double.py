@@ -8,7 +8,7 @@ Available Precision, Numerische Mathematik 18, 1971; Shewchuk, Adaptive Precisio
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import larger
+from renderer.numerics.simd import maximum
 
 _LEAST_NORMAL = 2.0**-1022
 _SPLITTER = 2.0**27 + 1.0
@@ -106,11 +106,11 @@ def scaled_difference(a, b, factor):
 @kernel
 def length_pair(a):
     """The length of a vector of pairs, as a pair."""
-    largest = larger(larger(abs(a[0][0]), abs(a[1][0])), abs(a[2][0]))
+    largest = maximum(maximum(abs(a[0][0]), abs(a[1][0])), abs(a[2][0]))
     if largest == 0.0:
         return 0.0, 0.0
     # Scaled, so that no square vanishes.
-    unit = power_below(larger(largest, _LEAST_NORMAL))
+    unit = power_below(maximum(largest, _LEAST_NORMAL))
     x, y, z = a
     b = (x[0] / unit, x[1] / unit), (y[0] / unit, y[1] / unit), (z[0] / unit, z[1] / unit)
     square = dot_pairs(b, b)

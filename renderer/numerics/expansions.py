@@ -7,7 +7,7 @@ Source: Shewchuk, Adaptive Precision Floating-Point Arithmetic, Discrete and Com
 
 from renderer.jit.decorators import kernel
 from renderer.numerics.double_double import difference, exact_product, exact_sum
-from renderer.numerics.simd import get, larger, put, smaller
+from renderer.numerics.simd import load, maximum, minimum, store
 
 # The number of parts where products would vanish or overflow.
 OUT_OF_RANGE = -1
@@ -38,10 +38,10 @@ def expand_volume(a, b, c, p, parts):
 def _expand_triple(a, b, c, parts):
     """a . (b x c) of vectors of pairs."""
     (ax, ay, az), (bx, by, bz), (cx, cy, cz) = a, b, c
-    least = smaller(_least(ax, bx), _least(cx, cx)) * smaller(_least(ay, by), _least(cy, cy))
-    most = larger(_most(ax, bx), _most(cx, cx)) * larger(_most(ay, by), _most(cy, cy))
-    least *= smaller(_least(az, bz), _least(cz, cz))
-    most *= larger(_most(az, bz), _most(cz, cz))
+    least = minimum(_least(ax, bx), _least(cx, cx)) * minimum(_least(ay, by), _least(cy, cy))
+    most = maximum(_most(ax, bx), _most(cx, cx)) * maximum(_most(ay, by), _most(cy, cy))
+    least *= minimum(_least(az, bz), _least(cz, cz))
+    most *= maximum(_most(az, bz), _most(cz, cz))
     if least <= _SMALLEST_VOLUME or most >= _LARGEST:
         return OUT_OF_RANGE
     count = _add_volume(parts, 0, ax, by, cz, 1.0)
@@ -68,7 +68,7 @@ def sign_of(parts, count):
     """The sign of an expansion: that of its largest part."""
     if count == 0:
         return 0
-    return 1 if get(parts, count - 1) > 0.0 else -1
+    return 1 if load(parts, count - 1) > 0.0 else -1
 
 
 @kernel
@@ -76,7 +76,7 @@ def pair_of(parts, count):
     """An expansion as a pair, to 2^-100 of itself."""
     head, tail = 0.0, 0.0
     for i in range(count - 1, -1, -1):
-        head, rest = exact_sum(head, get(parts, i))
+        head, rest = exact_sum(head, load(parts, i))
         tail += rest
     return exact_sum(head, tail)
 
@@ -86,14 +86,14 @@ def _least(a, b):
     """The least part of two pairs, without signs and zeros; 1 at most."""
     least = 1.0
     for x in (a[0], a[1], b[0], b[1]):
-        least = smaller(least, abs(x)) if x != 0.0 else least
+        least = minimum(least, abs(x)) if x != 0.0 else least
     return least
 
 
 @kernel
 def _most(a, b):
     """The largest part of two pairs, without signs; 1 at least."""
-    return larger(larger(abs(a[0]), abs(b[0])), 1.0)
+    return maximum(maximum(abs(a[0]), abs(b[0])), 1.0)
 
 
 @kernel
@@ -130,11 +130,11 @@ def _add(parts, count, x):
     """Add a number to an expansion, whose parts rise; parts that are 0 are left out."""
     kept = 0
     for i in range(count):
-        x, rest = exact_sum(x, get(parts, i))
+        x, rest = exact_sum(x, load(parts, i))
         if rest != 0.0:
-            put(parts, kept, rest)
+            store(parts, kept, rest)
             kept += 1
     if x != 0.0:
-        put(parts, kept, x)
+        store(parts, kept, x)
         kept += 1
     return kept

@@ -5,7 +5,7 @@ import numpy as np
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import power_below
 from renderer.numerics.expansions import OUT_OF_RANGE, expand_area, expand_slope, expand_volume, sign_of
-from renderer.numerics.simd import larger, smaller
+from renderer.numerics.simd import maximum, minimum
 
 # What all functions here say where products would vanish or overflow.
 UNDECIDED = 2
@@ -50,8 +50,8 @@ def balance(a, b, c, d):
     """
     least, most = np.inf, 0.0
     for x in (abs(a), abs(b), abs(c), abs(d)):
-        least, most = (smaller(least, x) if x != 0.0 else least), larger(most, x)
-    return power_below(smaller(1.0 / (np.sqrt(least) * np.sqrt(most)), _MOST)) if most != 0.0 else 1.0
+        least, most = (minimum(least, x) if x != 0.0 else least), maximum(most, x)
+    return power_below(minimum(1.0 / (np.sqrt(least) * np.sqrt(most)), _MOST)) if most != 0.0 else 1.0
 
 
 @inlined

@@ -180,13 +180,13 @@ def _extreme(a: Any, b: Any, predicate: str) -> Any:
 
 
 @intrinsic
-def larger(typingctx, a, b):
+def maximum(typingctx, a, b):
     """``max(a, b)`` of two numbers of one type, or of float vectors; a where either is NaN."""
     return _extreme(a, b, ">")
 
 
 @intrinsic
-def smaller(typingctx, a, b):
+def minimum(typingctx, a, b):
     """``min(a, b)`` of two numbers of one type, or of float vectors; a where either is NaN."""
     return _extreme(a, b, "<")
 
@@ -228,7 +228,7 @@ def double_of(typingctx, bits):
 
 
 @intrinsic
-def get(typingctx, base, index):
+def load(typingctx, base, index):
     """The element at ``index`` of a ``pointer``."""
 
     def codegen(context, builder, sig, args):
@@ -238,7 +238,7 @@ def get(typingctx, base, index):
 
 
 @intrinsic
-def at(typingctx, base, index):
+def offset(typingctx, base, index):
     """A ``pointer`` to the element at ``index`` of another."""
 
     def codegen(context, builder, sig, args):
@@ -266,12 +266,6 @@ def prefetch(typingctx, base, index):
 def _put(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     context.pack_value(builder, sig.args[0].dtype, args[2], builder.gep(args[0], [args[1]]))
     return context.get_dummy_value()
-
-
-@intrinsic
-def put(typingctx, base, index, value):
-    """Write the element at ``index`` of a ``pointer``."""
-    return types.void(base, types.intp, base.dtype), _put
 
 
 def _load(builder: Any, pointer: Any, array_type: Any) -> Any:
@@ -320,7 +314,7 @@ def gather8(typingctx, base, rows, step, column):
 
 
 @intrinsic
-def every8(typingctx, base, first, step):
+def load_strided8(typingctx, base, first, step):
     """Eight float64 of a ``pointer``, each ``step`` after the one before."""
 
     def codegen(context, builder, sig, args):
@@ -364,7 +358,7 @@ def is_negative(typingctx, number):
 
 
 @intrinsic
-def alike(typingctx, number, other):
+def broadcast_like(typingctx, number, other):
     """A number, or where ``other`` is a vector of eight, eight of it."""
     number = types.unliteral(number)
     kind = _lanes_of(MASK8, number) if isinstance(other, Vector) else number
@@ -433,7 +427,7 @@ def _call(builder: Any, name: str, vector: Vector, value: Any) -> Any:
 
 
 @intrinsic
-def magnitude(typingctx, vector):
+def fabs(typingctx, vector):
     """The absolute value of a number, or of each lane."""
 
     def codegen(context, builder, sig, args):
@@ -484,13 +478,13 @@ def _fold(predicate: str) -> Any:
 
 
 @intrinsic
-def least(typingctx, vector):
+def reduce_min(typingctx, vector):
     """The smallest lane, where none is NaN."""
     return _lane(vector)(vector), _fold("<")
 
 
 @intrinsic
-def most(typingctx, vector):
+def reduce_max(typingctx, vector):
     """The largest lane, where none is NaN."""
     return _lane(vector)(vector), _fold(">")
 

@@ -3,7 +3,7 @@
 import math
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import get, larger, put
+from renderer.numerics.simd import load, maximum, store
 
 
 @kernel
@@ -50,13 +50,13 @@ def times(a, b):
 @inlined
 def largest_component(a):
     """The largest of three numbers without their signs."""
-    return larger(abs(a[0]), larger(abs(a[1]), abs(a[2])))
+    return maximum(abs(a[0]), maximum(abs(a[1]), abs(a[2])))
 
 
 @inlined
 def largest_of_three(a, b, c):
     """The ``largest_component`` of three vectors."""
-    return larger(largest_component(a), larger(largest_component(b), largest_component(c)))
+    return maximum(largest_component(a), maximum(largest_component(b), largest_component(c)))
 
 
 # The reciprocal of a denormal number overflows.
@@ -91,7 +91,7 @@ def length(a):
 @inlined
 def three(base, at):
     """Three numbers of a ``pointer``, from ``at``."""
-    return (get(base, at), get(base, at + 1), get(base, at + 2))
+    return (load(base, at), load(base, at + 1), load(base, at + 2))
 
 
 @inlined
@@ -103,9 +103,9 @@ def row3(base, i):
 @inlined
 def put3(base, at, a):
     """Write three numbers to a ``pointer``, from ``at``."""
-    put(base, at, a[0])
-    put(base, at + 1, a[1])
-    put(base, at + 2, a[2])
+    store(base, at, a[0])
+    store(base, at + 1, a[1])
+    store(base, at + 2, a[2])
 
 
 @kernel

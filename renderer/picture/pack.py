@@ -84,7 +84,8 @@ def media_around(scene: Scene, camera: Camera) -> NDArray[np.int64]:
     for instance in scene.instances:
         if scene.materials[instance.material].passes_light and _is_inside(instance.mesh, np.array(camera.eye)):
             p0, p1, p2 = instance.mesh.triangles.transpose(1, 0, 2)
-            volume = abs(np.einsum("nk,nk->", p0, np.cross(p1, p2)))
+            with np.errstate(over="ignore", invalid="ignore"):  # such sizes are refused when the tree is built
+                volume = abs(np.einsum("nk,nk->", p0, np.cross(p1, p2)))
             around.append((volume, rows[instance.material]))
     # rule: media-by-volume
     return np.array([row for _, row in sorted(around, reverse=True)][:MAX_MEDIA], np.int64)

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined
-from renderer.numerics.simd import at, get, put
+from renderer.numerics.simd import load, offset, store
 from renderer.trace.starts.record import ROW
 
 # The side in pixels of the block that a bundle of camera rays covers, and the most rays of a bundle.
@@ -35,43 +35,46 @@ class Bundle(NamedTuple):
 @inlined
 def bundle_at(doubles, integers, limit, slot):
     """The bundle in place ``slot`` of two arrays of bundles."""
-    doubles, integers = at(doubles, slot * BUNDLE_DOUBLES), at(integers, slot * (BUNDLE_INTEGERS + SIZE * limit))
+    doubles, integers = (
+        offset(doubles, slot * BUNDLE_DOUBLES),
+        offset(integers, slot * (BUNDLE_INTEGERS + SIZE * limit)),
+    )
     return Bundle(
-        at(doubles, _ORIGIN), at(doubles, _DIRECTION), at(doubles, _WEIGHT), at(doubles, _START),
-        integers, at(integers, _PIXEL), at(integers, _COUNT), at(integers, BUNDLE_INTEGERS), limit,
+        offset(doubles, _ORIGIN), offset(doubles, _DIRECTION), offset(doubles, _WEIGHT), offset(doubles, _START),
+        integers, offset(integers, _PIXEL), offset(integers, _COUNT), offset(integers, BUNDLE_INTEGERS), limit,
     )  # fmt: skip
 
 
 @inlined
 def clear(bundle, depth):
     """Empty a bundle, for rays of ``depth`` bounces."""
-    put(bundle.header, 0, 0)
-    put(bundle.header, 1, np.int64(depth))
+    store(bundle.header, 0, 0)
+    store(bundle.header, 1, np.int64(depth))
 
 
 @inlined
 def count_of(bundle):
     """The number of rays in a bundle."""
-    return get(bundle.header, 0)
+    return load(bundle.header, 0)
 
 
 @inlined
 def depth_of(bundle):
     """The number of bounces before its rays."""
-    return get(bundle.header, 1)
+    return load(bundle.header, 1)
 
 
 @inlined
 def append(bundle, o, d, weight, pixel, media, count):
     """Add a ray that is in the first ``count`` of ``media``; returns its row of starts, which is to be written."""
-    i = get(bundle.header, 0)
-    put(bundle.header, 0, i + 1)
+    i = load(bundle.header, 0)
+    store(bundle.header, 0, i + 1)
     for k in range(3):
-        put(bundle.origins, 3 * i + k, o[k])
-        put(bundle.directions, 3 * i + k, d[k])
-        put(bundle.weights, 3 * i + k, weight[k])
-    put(bundle.pixels, i, pixel)
-    put(bundle.media_counts, i, count)
+        store(bundle.origins, 3 * i + k, o[k])
+        store(bundle.directions, 3 * i + k, d[k])
+        store(bundle.weights, 3 * i + k, weight[k])
+    store(bundle.pixels, i, pixel)
+    store(bundle.media_counts, i, count)
     for k in range(count):
-        put(bundle.media, i * bundle.limit + k, get(media, k))
-    return at(bundle.starts, i * ROW)
+        store(bundle.media, i * bundle.limit + k, load(media, k))
+    return offset(bundle.starts, i * ROW)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import get, pointer, put, smaller
+from renderer.numerics.simd import load, minimum, pointer, store
 from renderer.numerics.vec3 import dot
 from renderer.shade.records import IOR
 from renderer.shade.surface import Look, left_from, lets_through, look_at, scene_pointers
@@ -68,7 +68,7 @@ def place_at(spot, surface, d):
 @inlined
 def may_coincide(scene, face):
     """Whether a face may coincide with another, of which one passes light."""
-    return scene.has_touching and get(scene.touching, face) != 0
+    return scene.has_touching and load(scene.touching, face) != 0
 
 
 @inlined
@@ -115,14 +115,14 @@ def look_together(scene, together, d):
 
 @inlined
 def _material_of(scene, holders, k):
-    return np.int64(get(scene.material, holder(holders, k, NUMBER)))
+    return np.int64(load(scene.material, holder(holders, k, NUMBER)))
 
 
 @inlined
 def _enter(media, count, material, most):
     """Add a medium to ``media`` in place, unless there are ``most``; returns their number."""
     if count < most:
-        put(media, count, np.int64(material))
+        store(media, count, np.int64(material))
         count += 1
     return count
 
@@ -134,16 +134,16 @@ def _leave(media, count, material):
     """
     # rule: innermost-entry
     for k in range(count - 1, -1, -1):
-        if get(media, k) == material:
+        if load(media, k) == material:
             for j in range(k, count - 1):
-                put(media, j, get(media, j + 1))
+                store(media, j, load(media, j + 1))
             return count - 1
     return count
 
 
 @inlined
 def _innermost_ior(scene, media, count):
-    return get(scene.materials, get(media, count - 1) + IOR) if count > 0 else 1.0
+    return load(scene.materials, load(media, count - 1) + IOR) if count > 0 else 1.0
 
 
 @inlined
@@ -154,17 +154,17 @@ def cross(scene, together, m, inside, media, beyond, memory):
     A ninth medium is not remembered: leaving it then leads back into the eighth.
     """
     for k in range(media.count):
-        put(beyond, k, get(media.rows, k))
+        store(beyond, k, load(media.rows, k))
     if together.count > 0:
         return _cross_all(scene, together.count, media, beyond, memory)
     n1, count = _innermost_ior(scene, media.rows, media.count), media.count
     if inside:
         count = _leave(beyond, count, m)
         # A body that the ray never entered, as through the hole of a mesh.
-        n1 = get(scene.materials, m + IOR) if count == media.count else n1
+        n1 = load(scene.materials, m + IOR) if count == media.count else n1
     else:
         count = _enter(beyond, count, m, media.limit + SPARE)
-    return Change(n1, _innermost_ior(scene, beyond, count), smaller(count, media.limit))
+    return Change(n1, _innermost_ior(scene, beyond, count), minimum(count, media.limit))
 
 
 @kernel
@@ -181,8 +181,8 @@ def _cross_all(scene, members, media, beyond, memory):
         if holder(holders, k, PATH) == _LEFT:
             material, before = _material_of(scene, holders, k), count
             count = _leave(beyond, count, material)
-            n1 = get(scene.materials, material + IOR) if count == before else n1
-    return Change(n1, _innermost_ior(scene, beyond, count), smaller(count, media.limit))
+            n1 = load(scene.materials, material + IOR) if count == before else n1
+    return Change(n1, _innermost_ior(scene, beyond, count), minimum(count, media.limit))
 
 
 @kernel

@@ -6,7 +6,7 @@ k_a I_a + sum over lights V [k_d (N.L)+ + k_s (R.V)+^n] I_light
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import at, get, put
+from renderer.numerics.simd import load, offset, store
 from renderer.numerics.vec3 import add, put3, row3, three, times
 from renderer.shade.bundle import SIZE
 from renderer.shade.lights import aim, see_light
@@ -40,65 +40,70 @@ def trace_rays(tree, rays, found, count, scratch, any_hit):
 @inlined
 def place_of(surface):
     """The ``Place`` of a surface."""
-    row = at(surface, PLACE)
-    return Place(get(row, 0), get(row, 1), get(row, 2), get(row, 3), get(row, 4))
+    row = offset(surface, PLACE)
+    return Place(load(row, 0), load(row, 1), load(row, 2), load(row, 3), load(row, 4))
 
 
 @inlined
 def put_place(surface, spot, came):
     """Write the ``Place`` of a surface but for the slack, which ``put_bounds`` writes."""
-    row = at(surface, PLACE)
+    row = offset(surface, PLACE)
     put3(row, 0, (float(spot.face), spot.u, spot.v))
-    put(row, 4, came)
+    store(row, 4, came)
 
 
 @inlined
 def put_facet(surface, facet):
     """Write the ``Facet`` of a surface."""
     put3(surface, GEOMETRIC, facet.normal)
-    put(surface, GEOMETRIC + 3, facet.double_area)
-    put(surface, GEOMETRIC + 4, facet.side)
+    store(surface, GEOMETRIC + 3, facet.double_area)
+    store(surface, GEOMETRIC + 4, facet.side)
 
 
 @inlined
 def put_bounds(scene, surface):
     """Write the ``bounds_at`` a surface."""
-    row, area = at(surface, PLACE), at(surface, GEOMETRIC + 3)
-    facet = Facet(three(surface, GEOMETRIC), get(area, 0), get(area, 1))
-    error, slack = bounds_at(scene, np.int64(get(row, 0)), get(row, 1), get(row, 2), three(surface, POINT), facet)
-    put(surface, BOUND, error)
-    put(row, 3, slack)
+    row, area = offset(surface, PLACE), offset(surface, GEOMETRIC + 3)
+    facet = Facet(three(surface, GEOMETRIC), load(area, 0), load(area, 1))
+    error, slack = bounds_at(scene, np.int64(load(row, 0)), load(row, 1), load(row, 2), three(surface, POINT), facet)
+    store(surface, BOUND, error)
+    store(row, 3, slack)
 
 
 @inlined
 def is_lit(materials, m):
     """Whether the material in row ``m`` shows direct light."""
-    kind = get(materials, m + KIND)
+    kind = load(materials, m + KIND)
     return kind != MIRROR and kind != DIELECTRIC and kind != UNLIT
 
 
 @kernel
-def _aim_all(scene, bundle, surfaces, lit, count, light, offset, shadows):
+def _aim_all(scene, bundle, surfaces, lit, count, light, rule, shadows):
     """Aim shadow rays from the surfaces of the ``count`` rays in ``lit`` at a light.
 
     Returns the number of surfaces that face it; their rays go to ``lit`` from SIZE on.
     """
     aimed = 0
     for k in range(count):
-        i = get(lit, k)
-        surface = at(surfaces, i * SURFACE_DOUBLES)
-        p, n, n_g, error = three(surface, POINT), three(surface, NORMAL), three(surface, GEOMETRIC), get(surface, BOUND)
+        i = load(lit, k)
+        surface = offset(surfaces, i * SURFACE_DOUBLES)
+        p, n, n_g, error = (
+            three(surface, POINT),
+            three(surface, NORMAL),
+            three(surface, GEOMETRIC),
+            load(surface, BOUND),
+        )
         seen = see_light(scene.lights, light, p, n, error)
         if seen.faces:
-            ray = aim(seen, p, n_g, error, offset)
+            ray = aim(seen, p, n_g, error, rule)
             put3(shadows, _ORIGIN + 3 * aimed, ray.origin)
             put3(shadows, _DIRECTION + 3 * aimed, ray.direction)
-            put(shadows, _T_MAX + aimed, ray.t_max)
-            start, d = at(shadows, _START + ROW * aimed), row3(bundle.directions, i)
-            put_start(start, place_of(surface), n_g, ray.direction, d, offset)
+            store(shadows, _T_MAX + aimed, ray.t_max)
+            start, d = offset(shadows, _START + ROW * aimed), row3(bundle.directions, i)
+            put_start(start, place_of(surface), n_g, ray.direction, d, rule)
             put3(shadows, _TOWARDS + 3 * aimed, seen.towards)
             put3(shadows, _ARRIVING + 3 * aimed, seen.arriving)
-            put(lit, SIZE + aimed, i)
+            store(lit, SIZE + aimed, i)
             aimed += 1
     return aimed
 
@@ -106,7 +111,7 @@ def _aim_all(scene, bundle, surfaces, lit, count, light, offset, shadows):
 @inlined
 def _add_light(scene, bundle, surface, i, towards, arriving):
     """Add the share of a light that reaches the surface of ray ``i`` and is sent back along the ray."""
-    m, n, d = np.int64(get(surface, MATERIAL)), three(surface, NORMAL), row3(bundle.directions, i)
+    m, n, d = np.int64(load(surface, MATERIAL)), three(surface, NORMAL), row3(bundle.directions, i)
     factor = phong(scene, m, n, d, towards)
     put3(surface, LIGHT, add(three(surface, LIGHT), times(factor, arriving)))
 
@@ -115,14 +120,15 @@ def _add_light(scene, bundle, surface, i, towards, arriving):
 def _trace_shadows(tree, scene, bundle, lit, aimed, scratch):
     """Find which of the ``aimed`` shadow rays hit anything, and count all of them in their pixels."""
     shadows = scratch.shadows
-    starts = StartPointers(at(shadows, _START), ROW, scene.vertices, scene.faces)
+    starts = StartPointers(offset(shadows, _START), ROW, scene.vertices, scene.faces)
     rays = RayPointers(
-        at(shadows, _ORIGIN), at(shadows, _DIRECTION), scratch.zero, at(shadows, _T_MAX), 3, 3, 0, 1, 1.0, starts
+        offset(shadows, _ORIGIN), offset(shadows, _DIRECTION), scratch.zero, offset(shadows, _T_MAX),
+        3, 3, 0, 1, 1.0, starts,
     )  # fmt: skip
     trace_rays(tree, rays, scratch.found, aimed, scratch.trace, np.bool_(True))
     for k in range(aimed):
-        pixel = get(bundle.pixels, get(lit, SIZE + k))
-        put(scratch.traced, pixel, get(scratch.traced, pixel) + 1)
+        pixel = load(bundle.pixels, load(lit, SIZE + k))
+        store(scratch.traced, pixel, load(scratch.traced, pixel) + 1)
 
 
 @kernel
@@ -132,15 +138,15 @@ def light_surfaces(tree, scene, bundle, surfaces, lit, settings, scratch):
     ``lit`` holds the number of rays whose material shows direct light, then these rays, and room for as many again.
     Shadow rays are counted in ``scratch.traced`` of their pixels; without ``settings.shadows`` there are none.
     """
-    count, lit = get(lit, 0), at(lit, 1)
+    count, lit = load(lit, 0), offset(lit, 1)
     shadows = scratch.shadows
     for light in range(scene.light_count):
         aimed = _aim_all(scene, bundle, surfaces, lit, count, light, settings.offset, shadows)
         if settings.shadows:
             _trace_shadows(tree, scene, bundle, lit, aimed, scratch)
         for k in range(aimed):
-            i = get(lit, SIZE + k)
+            i = load(lit, SIZE + k)
             # rule: shadows
-            if not (settings.shadows and get(scratch.found.hit, k)):
+            if not (settings.shadows and load(scratch.found.hit, k)):
                 towards, arriving = three(shadows, _TOWARDS + 3 * k), three(shadows, _ARRIVING + 3 * k)
-                _add_light(scene, bundle, at(surfaces, i * SURFACE_DOUBLES), i, towards, arriving)
+                _add_light(scene, bundle, offset(surfaces, i * SURFACE_DOUBLES), i, towards, arriving)

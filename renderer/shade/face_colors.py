@@ -3,7 +3,7 @@
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import get, larger, pointer, smaller
+from renderer.numerics.simd import load, maximum, minimum, pointer
 from renderer.numerics.vec3 import add, cross, dot, normalized, row3, scale, sub, three, times
 from renderer.shade.lights import see_light
 from renderer.shade.records import AMBIENT
@@ -16,9 +16,9 @@ PLACES = 4096
 @inlined
 def _encoded(x, steps, first):
     """The sRGB code of x, found from the code at the beginning of its part of [0, 1]; see ``face_phong.CodeTable``."""
-    x = smaller(larger(x, 0.0), 1.0)
-    code = get(first, np.int64(x * PLACES))
-    while get(steps, code) <= x:
+    x = minimum(maximum(x, 0.0), 1.0)
+    code = load(first, np.int64(x * PLACES))
+    while load(steps, code) <= x:
         code += 1
     return code
 
@@ -31,7 +31,7 @@ def shade_faces(arrays, eye, colors, steps, first, begin, end):
         a, b, c = row3(seen.faces, face)
         p0, p1, p2 = row3(seen.vertices, a), row3(seen.vertices, b), row3(seen.vertices, c)
         p, n = scale(add(add(p0, p1), p2), 1.0 / 3.0), normalized(cross(sub(p1, p0), sub(p2, p0)))
-        d, m = normalized(sub(p, eye)), get(seen.material, face)
+        d, m = normalized(sub(p, eye)), load(seen.material, face)
         n = scale(n, -1.0) if dot(d, n) > 0.0 else n
         color = times(three(seen.materials, m + AMBIENT), row3(seen.colors, 0))
         for light in range(seen.light_count):

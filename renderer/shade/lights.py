@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import get
+from renderer.numerics.simd import load
 from renderer.numerics.vec3 import dot, normalized, scale, sub, three
 from renderer.shade.records import DIRECTIONAL, LIGHT_COLUMNS
 from renderer.shade.surface import scene_pointers
@@ -40,7 +40,7 @@ def see_light(lights, light, p, n, error):
     """
     row = light * LIGHT_COLUMNS
     place, arriving = three(lights, row + 1), three(lights, row + 4)
-    if get(lights, row) == DIRECTIONAL:
+    if load(lights, row) == DIRECTIONAL:
         return SeenLight(dot(n, place) > 0.0, True, place, place, arriving)
     to_light = sub(place, p)
     # A light within rounding of the surface lies on it and does not light it; this also bounds 1 / r^2.

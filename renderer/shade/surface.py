@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import get, pointer
+from renderer.numerics.simd import load, pointer
 from renderer.numerics.vec3 import add, barycentric, dot, largest_component, normalized, row3, scale, three
 from renderer.shade.records import DIFFUSE, KIND, PHONG, SHININESS, SPECULAR, TRANSMITTANCE
 from renderer.shade.shading import specular
@@ -117,12 +117,12 @@ def look_at(scene, face, u, v, d):
     p0, p1, p2 = row3(scene.vertices, a), row3(scene.vertices, b), row3(scene.vertices, c)
     facet = facet_of(p0, p1, p2, d)
     n_s = facet.normal
-    if scene.has_smooth and get(scene.smooth, face):
+    if scene.has_smooth and load(scene.smooth, face):
         n = barycentric(row3(scene.normals, a), row3(scene.normals, b), row3(scene.normals, c), u, v)
         # A file may hold zeros, and opposite normals cancel: a surface without a direction would let light through.
         # rule: unit-shading-normal
         n_s = normalized(n) if largest_component(n) > 0.0 else n_s
-    return Look(barycentric(p0, p1, p2, u, v), facet, n_s, get(scene.material, face))
+    return Look(barycentric(p0, p1, p2, u, v), facet, n_s, load(scene.material, face))
 
 
 @inlined
@@ -151,8 +151,8 @@ def phong(scene, m, n, d, towards):
     k_d N.L + k_s (R.V)^n, for N.L >= 0.
     """
     factor = scale(three(scene.materials, m + DIFFUSE), dot(n, towards))
-    if get(scene.materials, m + KIND) == PHONG:
-        shininess = get(scene.materials, m + SHININESS)
+    if load(scene.materials, m + KIND) == PHONG:
+        shininess = load(scene.materials, m + SHININESS)
         factor = add(factor, scale(three(scene.materials, m + SPECULAR), specular(d, n, towards, shininess)))
     return factor
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import at, get, pointer, put, smaller
+from renderer.numerics.simd import load, minimum, offset, pointer, store
 from renderer.numerics.vec3 import add, normalized, put3, row3, scale, three
 from renderer.shade.bundle import SIDE, SIZE, append, clear, count_of
 from renderer.shade.direct import INSIDE, NORMAL, SURFACE_DOUBLES
@@ -97,15 +97,15 @@ def _shoot(camera, scene, bundle, across, down, block):
 def _write_first_hits(film, bundle, scratch, block):
     """Write depth, face and shading normal of the camera rays of a block that were just traced."""
     for i in range(count_of(bundle)):
-        pixel, surface = get(bundle.pixels, i), at(scratch.surfaces, i * SURFACE_DOUBLES)
-        x, y, face = block.x0 + pixel % SIDE, block.y0 + pixel // SIDE, get(scratch.found.face, i)
+        pixel, surface = load(bundle.pixels, i), offset(scratch.surfaces, i * SURFACE_DOUBLES)
+        x, y, face = block.x0 + pixel % SIDE, block.y0 + pixel // SIDE, load(scratch.found.face, i)
         if len(film.depth) > 0:
-            film.depth[y, x] = get(scratch.found.t, i)
+            film.depth[y, x] = load(scratch.found.t, i)
         if len(film.face) > 0:
             film.face[y, x] = face
         if face >= 0 and len(film.normal) > 0:
             n = three(surface, NORMAL)
-            n = scale(n, -1.0) if get(surface, INSIDE) != 0.0 else n
+            n = scale(n, -1.0) if load(surface, INSIDE) != 0.0 else n
             for k in range(3):
                 film.normal[y, x, k] = n[k]
 
@@ -140,7 +140,7 @@ def _end_sample(film, block, scratch, total):
             pixel = (y - block.y0) * SIDE + x - block.x0
             put3(total, 3 * pixel, add(row3(total, pixel), row3(scratch.color, pixel)))
             if len(film.rays) > 0:
-                film.rays[y, x] += get(scratch.traced, pixel)
+                film.rays[y, x] += load(scratch.traced, pixel)
 
 
 @kernel
@@ -150,17 +150,17 @@ def _end_block(film, block, scratch, total, count):
     for y in range(block.y0, block.y1):
         for x in range(block.x0, block.x1):
             pixel = (y - block.y0) * SIDE + x - block.x0
-            cut += get(scratch.cut, pixel)
+            cut += load(scratch.cut, pixel)
             # The largest float32 stands for anything brighter, as from a light within 1e-15 of a surface.
             for k in range(3):
-                film.radiance[y, x, k] = smaller(get(total, 3 * pixel + k) / count, _BRIGHTEST)
+                film.radiance[y, x, k] = minimum(load(total, 3 * pixel + k) / count, _BRIGHTEST)
     return cut
 
 
 @inlined
 def _clear_block(scratch, total):
     for k in range(SIZE):
-        put(scratch.cut, k, 0)
+        store(scratch.cut, k, 0)
         put3(total, 3 * k, (0.0, 0.0, 0.0))
 
 
@@ -169,7 +169,7 @@ def _block_of(tile, k):
     """The k-th block of a tile, row by row; for k beyond the last, one below the tile."""
     across = (tile.x1 - tile.x0 + SIDE - 1) // SIDE
     x, y = tile.x0 + k % across * SIDE, tile.y0 + k // across * SIDE
-    return Rectangle(x, y, smaller(x + SIDE, tile.x1), smaller(y + SIDE, tile.y1))
+    return Rectangle(x, y, minimum(x + SIDE, tile.x1), minimum(y + SIDE, tile.y1))
 
 
 # The progress of a tile, int64: its block, the number of the block's samples that were begun, the number of bundles
@@ -182,13 +182,13 @@ def _next_sample(tree, scene, settings, camera, film, tile, scratch, total, stat
     """End the sample under way and begin the next one, in the next block after the last sample of a block. Returns
     whether there is one.
     """
-    block, begun = _block_of(tile, get(state, _BLOCK)), get(state, _BEGUN)
+    block, begun = _block_of(tile, load(state, _BLOCK)), load(state, _BEGUN)
     if begun > 0:
         _end_sample(film, block, scratch, total)
     if begun == camera.count:
-        put(state, CUT, get(state, CUT) + _end_block(film, block, scratch, total, camera.count))
-        put(state, _BLOCK, get(state, _BLOCK) + 1)
-        block, begun = _block_of(tile, get(state, _BLOCK)), 0
+        store(state, CUT, load(state, CUT) + _end_block(film, block, scratch, total, camera.count))
+        store(state, _BLOCK, load(state, _BLOCK) + 1)
+        block, begun = _block_of(tile, load(state, _BLOCK)), 0
     if block.y0 >= tile.y1:
         return False
     if begun == 0:
@@ -196,13 +196,13 @@ def _next_sample(tree, scene, settings, camera, film, tile, scratch, total, stat
         if _shows_first_hits(film) and not _has_centre(camera.count):
             _look(tree, scene, settings, camera, film, scratch, block)
     for k in range(SIZE):
-        put(scratch.traced, k, 0)
+        store(scratch.traced, k, 0)
         put3(scratch.color, 3 * k, (0.0, 0.0, 0.0))
-    across, down = get(camera.samples, 2 * begun), get(camera.samples, 2 * begun + 1)
+    across, down = load(camera.samples, 2 * begun), load(camera.samples, 2 * begun + 1)
     _shoot(camera, scene, slot(scratch, settings, 0), across, down, block)
-    put(state, _BEGUN, begun + 1)
-    put(state, _WAITING, 1)
-    put(state, _FROM_CAMERA, 1)
+    store(state, _BEGUN, begun + 1)
+    store(state, _WAITING, 1)
+    store(state, _FROM_CAMERA, 1)
     return True
 
 
@@ -233,14 +233,14 @@ def tile_scratch(depth: int, settings: Settings, bundles: int = 1 << 62) -> Tile
 @inlined
 def _trace_next(tree, scene, settings, camera, film, tile, scratch, state):
     """Trace the bundle that was spawned last, and spawn its bundles."""
-    top = get(state, _WAITING) - 1
+    top = load(state, _WAITING) - 1
     bundle = slot(scratch, settings, top)
     trace_bundle(tree, scene, settings, bundle, scratch)
-    if get(state, _FROM_CAMERA) != 0:
-        put(state, _FROM_CAMERA, 0)
-        if _has_centre(camera.count) and get(state, _BEGUN) == camera.count // 2 + 1:
-            _write_first_hits(film, bundle, scratch, _block_of(tile, get(state, _BLOCK)))
-    put(state, _WAITING, push_children(scene, settings, scratch, bundle, top))
+    if load(state, _FROM_CAMERA) != 0:
+        store(state, _FROM_CAMERA, 0)
+        if _has_centre(camera.count) and load(state, _BEGUN) == camera.count // 2 + 1:
+            _write_first_hits(film, bundle, scratch, _block_of(tile, load(state, _BLOCK)))
+    store(state, _WAITING, push_children(scene, settings, scratch, bundle, top))
 
 
 @kernel
@@ -256,10 +256,10 @@ def render_tile(descriptor, scene, settings, camera, samples, film, tile, arrays
     scratch = bundle_scratch(doubles, integers, hits, settings, scratch_pointers(arrays.trace))
     tree, seen = tree_pointers(descriptor), scene_pointers(scene)
     shooting = CameraMap(pointer(camera), pointer(samples), len(samples))
-    if get(state, _BLOCK) == 0 and get(state, _BEGUN) == 0:
+    if load(state, _BLOCK) == 0 and load(state, _BEGUN) == 0:
         begin_bundles(scratch, settings)
     for _ in range(arrays.bundles):
-        if get(state, _WAITING) == 0 and not _next_sample(
+        if load(state, _WAITING) == 0 and not _next_sample(
             tree, seen, settings, shooting, film, tile, scratch, total, state
         ):
             return True

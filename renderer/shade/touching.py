@@ -9,16 +9,16 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import (
-    get,
-    larger,
+    fabs,
+    load,
     load4,
     lowest_bit,
-    magnitude,
+    maximum,
+    minimum,
     movemask,
     pointer,
-    put,
-    smaller,
     splat4,
+    store,
 )
 from renderer.numerics.vec3 import largest_of_three, length, sub
 from renderer.shade.surface import lets_through, scene_pointers
@@ -41,8 +41,8 @@ def mark_touching(descriptor, arrays, begin, end, every, stack, touching):
     """
     tree, scene = tree_pointers(descriptor), scene_pointers(arrays)
     for slot in range(begin, end):
-        face = get(tree.faces, slot)
-        if face >= 0 and (every or lets_through(scene.materials, np.int64(get(scene.material, face)))):
+        face = load(tree.faces, slot)
+        if face >= 0 and (every or lets_through(scene.materials, np.int64(load(scene.material, face)))):
             _mark_touched(tree, slot, face, pointer(stack), pointer(touching))
 
 
@@ -57,7 +57,7 @@ def _corners(tree, slot):
 def _range(corners, k):
     """The least and largest coordinate of a face along an axis."""
     a, b, c = corners[0][k], corners[1][k], corners[2][k]
-    return smaller(a, smaller(b, c)), larger(a, larger(b, c))
+    return minimum(a, minimum(b, c)), maximum(a, maximum(b, c))
 
 
 class _Flat(NamedTuple):
@@ -123,10 +123,10 @@ def _mark_touched_in(tree, query, first, blocks, found):
         while bits != 0:
             slot = block * BLOCK_FACES + lowest_bit(bits)
             bits &= bits - 1
-            other = get(tree.faces, slot)
+            other = load(tree.faces, slot)
             if other >= 0 and other != query.face and _may_coincide(query.flat, _corners(tree, slot)):
-                put(query.touching, query.face, np.uint8(1))
-                put(query.touching, other, np.uint8(1))
+                store(query.touching, query.face, np.uint8(1))
+                store(query.touching, other, np.uint8(1))
     return found, False
 
 
@@ -146,9 +146,9 @@ def _level_bits(tree, base, flat):
         z = _coordinates(tree, base + 12 * k + 8) - splat4(p[2])
         height = x * splat4(n[0]) + y * splat4(n[1]) + z * splat4(n[2])
         # As ``level.are_level`` has it, with room to spare.
-        way = larger(magnitude(x), larger(magnitude(y), magnitude(z)))
+        way = maximum(fabs(x), maximum(fabs(y), fabs(z)))
         error = splat4(2.0 * CORNER_ERROR) * (splat4(flat.largest) + way)
-        bits &= movemask(magnitude(height) <= error * (splat4(flat.size) + splat4(flat.side) * way))
+        bits &= movemask(fabs(height) <= error * (splat4(flat.size) + splat4(flat.side) * way))
     return bits
 
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import at, get, put
+from renderer.numerics.simd import load, offset, store
 from renderer.numerics.vec3 import add, dot, largest_component, normalized, put3, row3, scale, three, times
 from renderer.shade.bundle import (
     BUNDLE_DOUBLES,
@@ -128,36 +128,36 @@ def bundle_scratch(doubles, integers, hits, settings, trace):
     ``begin_bundles`` comes first.
     """
     slots = settings.max_depth + 4
-    t = at(doubles, slots * BUNDLE_DOUBLES)
-    u, v, zero = at(t, SIZE), at(t, 2 * SIZE), at(t, 3 * SIZE)
-    infinity, surfaces = at(zero, 1), at(zero, 2)
-    shadows = at(surfaces, SIZE * SURFACE_DOUBLES)
-    order = at(integers, slots * (BUNDLE_INTEGERS + SIZE * settings.media))
-    face = at(order, slots)
-    lit = at(face, SIZE)
-    beyond = at(lit, 1 + 2 * SIZE)
-    traced = at(beyond, SIZE * (settings.media + SPARE))
-    side = at(traced, 2 * SIZE)
+    t = offset(doubles, slots * BUNDLE_DOUBLES)
+    u, v, zero = offset(t, SIZE), offset(t, 2 * SIZE), offset(t, 3 * SIZE)
+    infinity, surfaces = offset(zero, 1), offset(zero, 2)
+    shadows = offset(surfaces, SIZE * SURFACE_DOUBLES)
+    order = offset(integers, slots * (BUNDLE_INTEGERS + SIZE * settings.media))
+    face = offset(order, slots)
+    lit = offset(face, SIZE)
+    beyond = offset(lit, 1 + 2 * SIZE)
+    traced = offset(beyond, SIZE * (settings.media + SPARE))
+    side = offset(traced, 2 * SIZE)
     found = HitPointers(t, face, u, v, side, side, hits)
     return BundleScratch(
         doubles, integers, order, trace, found, zero, infinity, surfaces, shadows, lit, beyond,
-        at(shadows, SHADOW_DOUBLES), traced, at(traced, SIZE),
+        offset(shadows, SHADOW_DOUBLES), traced, offset(traced, SIZE),
     )  # fmt: skip
 
 
 @inlined
 def begin_bundles(scratch, settings):
     """Set the bounds of all rays, and the order of the places at the start."""
-    put(scratch.zero, 0, 0.0)
-    put(scratch.infinity, 0, np.inf)
+    store(scratch.zero, 0, 0.0)
+    store(scratch.infinity, 0, np.inf)
     for slot in range(settings.max_depth + 4):
-        put(scratch.order, slot, slot)
+        store(scratch.order, slot, slot)
 
 
 @inlined
 def slot(scratch, settings, k):
     """The bundle in the k-th place of the order."""
-    return bundle_at(scratch.bundles, scratch.bundle_words, settings.media, get(scratch.order, k))
+    return bundle_at(scratch.bundles, scratch.bundle_words, settings.media, load(scratch.order, k))
 
 
 @inlined
@@ -169,15 +169,15 @@ def _goes_on(weight, min_weight):
 @inlined
 def _beyond(scratch, limit, i):
     """The place for the media beyond the surface that ray ``i`` met."""
-    return at(scratch.beyond, i * (limit + SPARE))
+    return offset(scratch.beyond, i * (limit + SPARE))
 
 
 @inlined
 def _put_change(scene, bundle, scratch, i, together, inside):
     """Write how the media of ray ``i`` change where it crosses the surface that it met."""
-    surface = at(scratch.surfaces, i * SURFACE_DOUBLES)
-    media = Media(at(bundle.media, i * bundle.limit), get(bundle.media_counts, i), bundle.limit)
-    m = np.int64(get(surface, MATERIAL))
+    surface = offset(scratch.surfaces, i * SURFACE_DOUBLES)
+    media = Media(offset(bundle.media, i * bundle.limit), load(bundle.media_counts, i), bundle.limit)
+    m = np.int64(load(surface, MATERIAL))
     change = cross(scene, together, m, inside, media, _beyond(scratch, bundle.limit, i), scratch.trace.holders)
     put3(surface, CHANGE, (change.n1, change.n2, float(change.left)))
     last = together.far
@@ -187,15 +187,15 @@ def _put_change(scene, bundle, scratch, i, together, inside):
 @inlined
 def _put_look(scene, bundle, scratch, i, together, look):
     """Write what ray ``i`` sees where it meets some faces together, and its ambient light, to ``scratch``."""
-    surface, d = at(scratch.surfaces, i * SURFACE_DOUBLES), row3(bundle.directions, i)
+    surface, d = offset(scratch.surfaces, i * SURFACE_DOUBLES), row3(bundle.directions, i)
     # The shading normal faces the eye; a surface without light from behind has two sides.
     inside = dot(d, look.n_s) > 0.0
     put3(surface, POINT, look.p)
     put3(surface, NORMAL, scale(look.n_s, -1.0) if inside else look.n_s)
     put_facet(surface, look.facet)
     put_place(surface, together.near, came_from(look.facet.normal, d))
-    put(surface, MATERIAL, float(look.material))
-    put(surface, INSIDE, 1.0 if inside else 0.0)
+    store(surface, MATERIAL, float(look.material))
+    store(surface, INSIDE, 1.0 if inside else 0.0)
     put3(surface, LIGHT, times(three(scene.materials, look.material + AMBIENT), row3(scene.colors, 0)))
     if passes_light(scene.materials, look.material):
         _put_change(scene, bundle, scratch, i, together, inside)
@@ -207,7 +207,7 @@ def _meet_together(tree, scene, bundle, scratch, i, spot):
     """Write what ray ``i`` sees at a ``Spot`` where faces may coincide; returns its material."""
     d = row3(bundle.directions, i)
     together = faces_together(tree, scene, spot, d, scratch.trace.packet_stack, scratch.trace.holders)
-    put(scratch.found.face, i, together.seen.face)
+    store(scratch.found.face, i, together.seen.face)
     return _put_look(scene, bundle, scratch, i, together, look_together(scene, together, d))
 
 
@@ -215,7 +215,7 @@ def _meet_together(tree, scene, bundle, scratch, i, spot):
 def _meet_surface(tree, scene, bundle, scratch, i):
     """Write what ray ``i`` sees; returns its material."""
     found = scratch.found
-    spot = Spot(get(found.face, i), get(found.u, i), get(found.v, i))
+    spot = Spot(load(found.face, i), load(found.u, i), load(found.v, i))
     if may_coincide(scene, spot.face):
         return _meet_together(tree, scene, bundle, scratch, i, spot)
     look = look_at(scene, spot.face, spot.u, spot.v, row3(bundle.directions, i))
@@ -227,19 +227,19 @@ def _meet_surfaces(tree, scene, bundle, scratch):
     """Write the surfaces that rays met to ``scratch``, and list the lit rays; rays that met none add the background."""
     lit = 0
     for i in range(count_of(bundle)):
-        pixel = get(bundle.pixels, i)
-        put(scratch.traced, pixel, get(scratch.traced, pixel) + 1)
-        if get(scratch.found.face, i) < 0:
+        pixel = load(bundle.pixels, i)
+        store(scratch.traced, pixel, load(scratch.traced, pixel) + 1)
+        if load(scratch.found.face, i) < 0:
             seen = times(row3(bundle.weights, i), row3(scene.colors, 1))
             put3(scratch.color, 3 * pixel, add(row3(scratch.color, pixel), seen))
         elif is_lit(scene.materials, _meet_surface(tree, scene, bundle, scratch, i)):
             lit += 1
-            put(scratch.lit, lit, i)
-    put(scratch.lit, 0, lit)
+            store(scratch.lit, lit, i)
+    store(scratch.lit, 0, lit)
     # In a loop of their own, as the processor overlaps more of short rounds.
     for i in range(count_of(bundle)):
-        if get(scratch.found.face, i) >= 0:
-            put_bounds(scene, at(scratch.surfaces, i * SURFACE_DOUBLES))
+        if load(scratch.found.face, i) >= 0:
+            put_bounds(scene, offset(scratch.surfaces, i * SURFACE_DOUBLES))
 
 
 @inlined
@@ -251,7 +251,7 @@ def _refract(scene, m, d, n, n1, n2):
     k_r, k_t = three(materials, m + REFLECTANCE), three(materials, m + TRANSMITTANCE)
     # rule: refraction
     cos_t, through = refract(d, n, n1, n2)
-    if get(materials, m + KIND) == DIELECTRIC:
+    if load(materials, m + KIND) == DIELECTRIC:
         # rule: total-reflection
         f = 1.0 if cos_t < 0.0 else fresnel(-dot(d, n), cos_t, n1, n2)
         # rule: tint-of-glass
@@ -262,7 +262,7 @@ def _refract(scene, m, d, n, n1, n2):
 @inlined
 def passes_light(materials, m):
     """Whether the material in row ``m`` has refracted rays, of weight 0 perhaps."""
-    return lets_through(materials, m) or get(materials, m + KIND) == DIELECTRIC
+    return lets_through(materials, m) or load(materials, m + KIND) == DIELECTRIC
 
 
 @kernel
@@ -289,21 +289,21 @@ class _Exit(NamedTuple):
 @inlined
 def _exit_of(surface):
     """The ``_Exit`` of rays that stay on the side of a surface from which it was met."""
-    return _Exit(three(surface, POINT), get(surface, BOUND), three(surface, GEOMETRIC), place_of(surface))
+    return _Exit(three(surface, POINT), load(surface, BOUND), three(surface, GEOMETRIC), place_of(surface))
 
 
 @inlined
 def _exit_beyond(scene, surface, d):
     """The ``_Exit`` of a ray that goes through all the faces that a ray of direction d met together."""
-    if np.int64(get(surface, LAST)) == np.int64(get(surface, PLACE)):
+    if np.int64(load(surface, LAST)) == np.int64(load(surface, PLACE)):
         return _exit_of(surface)
-    return _exit_at(scene, at(surface, LAST), d)
+    return _exit_at(scene, offset(surface, LAST), d)
 
 
 @kernel
 def _exit_at(scene, row, d):
     """The ``_Exit`` from the ``Spot`` in a row."""
-    last = Spot(np.int64(get(row, 0)), get(row, 1), get(row, 2))
+    last = Spot(np.int64(load(row, 0)), load(row, 1), load(row, 2))
     met = surface_at(scene, last.face, last.u, last.v, d)
     return _Exit(met.p, met.error, met.n_g, place_at(last, met, d))
 
@@ -323,8 +323,8 @@ def _may_leave(scratch, pixel, weight, settings):
     if not _goes_on(weight, settings.min_weight):
         return False
     # rule: ray-budget
-    if get(scratch.traced, pixel) >= settings.max_rays:
-        put(scratch.cut, pixel, 1)
+    if load(scratch.traced, pixel) >= settings.max_rays:
+        store(scratch.cut, pixel, 1)
         return False
     return True
 
@@ -334,10 +334,10 @@ def _bounce(scene, bundle, settings, scratch, refracted, reflected):
     """Collect the refracted and the reflected rays that a bundle spawns."""
     materials = scene.materials
     for i in range(count_of(bundle)):
-        if get(scratch.found.face, i) < 0:
+        if load(scratch.found.face, i) < 0:
             continue
-        surface = at(scratch.surfaces, i * SURFACE_DOUBLES)
-        m, weight, pixel = np.int64(get(surface, MATERIAL)), row3(bundle.weights, i), get(bundle.pixels, i)
+        surface = offset(scratch.surfaces, i * SURFACE_DOUBLES)
+        m, weight, pixel = np.int64(load(surface, MATERIAL)), row3(bundle.weights, i), load(bundle.pixels, i)
         d, n, k_r = row3(bundle.directions, i), three(surface, NORMAL), three(materials, m + REFLECTANCE)
         if passes_light(materials, m):
             n1, n2, left = three(surface, CHANGE)
@@ -346,7 +346,7 @@ def _bounce(scene, bundle, settings, scratch, refracted, reflected):
                 leaving, beyond = _exit_beyond(scene, surface, d), _beyond(scratch, bundle.limit, i)
                 _spawn(leaving, pixel, d, w, times(weight, k_t), refracted, beyond, np.int64(left), settings)
         if _may_leave(scratch, pixel, times(weight, k_r), settings):
-            media, count = at(bundle.media, i * bundle.limit), get(bundle.media_counts, i)
+            media, count = offset(bundle.media, i * bundle.limit), load(bundle.media_counts, i)
             w = reflect(d, n)
             _spawn(_exit_of(surface), pixel, d, w, times(weight, k_r), reflected, media, count, settings)
 
@@ -355,12 +355,12 @@ def _bounce(scene, bundle, settings, scratch, refracted, reflected):
 def _collect_light(scene, bundle, scratch):
     """Add the ambient and direct light of a bundle's surfaces to the pixels."""
     for i in range(count_of(bundle)):
-        if get(scratch.found.face, i) < 0:
+        if load(scratch.found.face, i) < 0:
             continue
-        surface = at(scratch.surfaces, i * SURFACE_DOUBLES)
-        kind = get(scene.materials, np.int64(get(surface, MATERIAL)) + KIND)
+        surface = offset(scratch.surfaces, i * SURFACE_DOUBLES)
+        kind = load(scene.materials, np.int64(load(surface, MATERIAL)) + KIND)
         if kind != MIRROR and kind != DIELECTRIC:
-            pixel = get(bundle.pixels, i)
+            pixel = load(bundle.pixels, i)
             own = times(row3(bundle.weights, i), three(surface, LIGHT))
             put3(scratch.color, 3 * pixel, add(row3(scratch.color, pixel), own))
 
@@ -395,11 +395,11 @@ def push_children(scene, settings, scratch, bundle, top):
     clear(refracted, depth_of(bundle) + 1)
     clear(reflected, depth_of(bundle) + 1)
     _bounce(scene, bundle, settings, scratch, refracted, reflected)
-    order, own = scratch.order, get(scratch.order, top)
-    first, second = get(order, top + 1), get(order, top + 2)
+    order, own = scratch.order, load(scratch.order, top)
+    first, second = load(order, top + 1), load(order, top + 2)
     if count_of(refracted) == 0:
         first, second = second, first
-    put(order, top, first)
-    put(order, top + 1, second)
-    put(order, top + 2, own)
+    store(order, top, first)
+    store(order, top + 1, second)
+    store(order, top + 2, own)
     return top + np.int64(count_of(refracted) > 0) + np.int64(count_of(reflected) > 0)

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from renderer.jit.decorators import kernel
 from renderer.numerics.predicates import UNDECIDED, volume_sign
 from renderer.numerics.rational import corners_from, volume
-from renderer.numerics.simd import at, local_doubles, pointer
+from renderer.numerics.simd import local_doubles, offset, pointer
 from renderer.numerics.vec3 import row3
 
 Floats = NDArray[np.float64]
@@ -47,5 +47,5 @@ def _write_signs(corners, eye, signs):
     """Write ``volume_sign`` of faces and an eye to ``signs``."""
     parts, p = local_doubles(), row3(pointer(eye), 0)
     for i in range(len(corners)):
-        face = at(pointer(corners), 9 * i)
+        face = offset(pointer(corners), 9 * i)
         signs[i] = volume_sign(row3(face, 0), row3(face, 1), row3(face, 2), p, parts)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import at, get, pointer, put, smaller
+from renderer.numerics.simd import load, minimum, offset, pointer, store
 from renderer.numerics.vec3 import add, cross, dot, largest_component, normalized, put3, row3, scale, three
 from renderer.trace.intersect import CORNER
 from renderer.trace.layout import cache_aligned
@@ -169,12 +169,12 @@ def make_sweep_scratch(depth: int) -> SweepScratch:
 def _scratch_pointers(arrays, vertices, faces):
     """The ``_SweepPointers`` of a ``SweepScratch`` and a mesh."""
     doubles, integers = pointer(arrays.doubles), pointer(arrays.integers)
-    origins = at(doubles, _POINT_DOUBLES)
-    directions, limits, values = at(origins, 3 * RAYS), at(origins, 6 * RAYS), at(origins, 7 * RAYS)
-    starts, zero = at(origins, 8 * RAYS), at(origins, (8 + ROW) * RAYS)
-    put(zero, 0, 0.0)
+    origins = offset(doubles, _POINT_DOUBLES)
+    directions, limits, values = offset(origins, 3 * RAYS), offset(origins, 6 * RAYS), offset(origins, 7 * RAYS)
+    starts, zero = offset(origins, 8 * RAYS), offset(origins, (8 + ROW) * RAYS)
+    store(zero, 0, 0.0)
     return _SweepPointers(
-        doubles, integers, origins, directions, limits, starts, values, zero, at(integers, _POINT_INTEGERS),
+        doubles, integers, origins, directions, limits, starts, values, zero, offset(integers, _POINT_INTEGERS),
         pointer(vertices), pointer(faces),
         hit_pointers(arrays.hits, 0), scratch_pointers(arrays.trace), parallel_pointers(arrays.parallel),
     )  # fmt: skip
@@ -197,13 +197,13 @@ def _begin_tile(tree, places, rows, begin, count, scratch):
     """Read ``count`` points, those in ``rows`` from ``begin`` on, and prepare where their rays start."""
     points, normals, leaving = pointer(places.points), pointer(places.normals), pointer(places.leaving)
     step = np.int64(len(places.normals) > 1)
-    put(scratch.numbers, _LEFT, _TRIES)
-    put(scratch.numbers, _TABLES, 0)
+    store(scratch.numbers, _LEFT, _TRIES)
+    store(scratch.numbers, _TABLES, 0)
     for i in range(count):
         row = rows[begin + i]
-        face, o, start = get(leaving, row), row3(points, row), at(scratch.points, _START + ROW * i)
-        put(scratch.numbers, _ROW + i, row)
-        put(scratch.numbers, _HIDER + i, 0)
+        face, o, start = load(leaving, row), row3(points, row), offset(scratch.points, _START + ROW * i)
+        store(scratch.numbers, _ROW + i, row)
+        store(scratch.numbers, _HIDER + i, 0)
         put3(scratch.points, _ABOVE + 3 * i, o)
         put_no_start(start)
         if len(places.normals) > 0:
@@ -214,14 +214,14 @@ def _begin_tile(tree, places, rows, begin, count, scratch):
         if face >= 0:
             put3(start, ANCHOR, row3(pointer(places.anchors), row))
             _begin_on_face(tree, scratch, i, o, face, places.codes[row], len(places.normals) > 0)
-        put(scratch.points, _SUM + i, 0.0)
-        put(scratch.points, _WHOLE + i, 0.0)
+        store(scratch.points, _SUM + i, 0.0)
+        store(scratch.points, _WHOLE + i, 0.0)
 
 
 @kernel
 def _begin_on_face(tree, scratch, i, o, face, code, has_horizon):
     """Prepare where the rays of a tile's ``i``-th point start, which lies on a face; its normal says on which side."""
-    start, n = at(scratch.points, _START + ROW * i), three(scratch.points, _FRAME + 9 * i + 6)
+    start, n = offset(scratch.points, _START + ROW * i), three(scratch.points, _FRAME + 9 * i + 6)
     starts = StartPointers(start, 0, scratch.vertices, scratch.faces)
     corners, slack = corners_of(starts.vertices, starts.faces, face, tree.scale), EDGE
     if has_normal(corners[0], corners[1], corners[2]):
@@ -232,9 +232,9 @@ def _begin_on_face(tree, scratch, i, o, face, code, has_horizon):
         if has_horizon and slack != EDGE and dot(normal, n) != 0.0:
             code |= KNOWN | BACK | (ABOVE if dot(normal, n) > 0.0 else 0)
     put3(start, WAY, n)
-    put(start, FACE, np.float64(face))
-    put(start, SLACK, slack)
-    put(start, CODE, np.float64(code))
+    store(start, FACE, np.float64(face))
+    store(start, SLACK, slack)
+    store(start, CODE, np.float64(code))
     if slack == EDGE:
         _begin_on_edge(tree, starts, scratch, i, n, has_horizon)
 
@@ -242,37 +242,37 @@ def _begin_on_face(tree, scratch, i, o, face, code, has_horizon):
 @kernel
 def _begin_on_edge(tree, starts, scratch, i, n, has_horizon):
     """``_begin_on_face`` for a point on or near an edge."""
-    begin = get(scratch.numbers, _TABLES)
+    begin = load(scratch.numbers, _TABLES)
     anchor = anchor_of(start_at(starts, 0, tree.scale))
-    put(scratch.numbers, _CORNER + i, np.int64(anchor.zeros & (anchor.zeros - 1) != 0))
+    store(scratch.numbers, _CORNER + i, np.int64(anchor.zeros & (anchor.zeros - 1) != 0))
     put3(scratch.points, _ABOVE + 3 * i, scale(rounded(anchor), 1.0 / tree.scale))
-    put(scratch.numbers, _TABLE + i, -1)
+    store(scratch.numbers, _TABLE + i, -1)
     if has_horizon and _FANS - begin >= _LEAST_FAN:
-        stack, holders, table = scratch.trace.packet_stack, scratch.trace.holders, at(scratch.points, _FAN + begin)
+        stack, holders, table = scratch.trace.packet_stack, scratch.trace.holders, offset(scratch.points, _FAN + begin)
         take_side(tree, starts, n, stack, holders, table, _FANS - begin)
         if has_fan(table):
-            put(scratch.numbers, _TABLE + i, begin)
-            put(scratch.numbers, _TABLES, begin + size_of_fan(table))
+            store(scratch.numbers, _TABLE + i, begin)
+            store(scratch.numbers, _TABLES, begin + size_of_fan(table))
 
 
 @kernel
 def _start_ray(scratch, i, d, ray):
     """Write the origin and the start of a ray from point ``i`` in direction d. Returns whether nothing stops it yet."""
-    own, row = at(scratch.points, _START + ROW * i), at(scratch.starts, ROW * ray)
+    own, row = offset(scratch.points, _START + ROW * i), offset(scratch.starts, ROW * ray)
     for k in range(ROW):
-        put(row, k, get(own, k))
+        store(row, k, load(own, k))
     put3(scratch.origins, 3 * ray, three(scratch.points, _ABOVE + 3 * i))
-    if get(own, FACE) < 0.0:
+    if load(own, FACE) < 0.0:
         return True
-    if get(own, SLACK) == EDGE:
+    if load(own, SLACK) == EDGE:
         return _start_on_edge(scratch, i, d, row)
-    slope, code = dot(three(scratch.points, _FACING + 3 * i), d), np.int64(get(own, CODE))
+    slope, code = dot(three(scratch.points, _FACING + 3 * i), d), np.int64(load(own, CODE))
     # rule: side-of-study-ray
     above = slope >= 0.0
     if not above:
         put3(scratch.origins, 3 * ray, three(scratch.points, _BELOW + 3 * i))
     if abs(slope) <= LEVEL * largest_component(d):
-        put(row, SLACK, EDGE)
+        store(row, SLACK, EDGE)
         return True
     return code & KNOWN == 0 or above == (code & ABOVE != 0)
 
@@ -280,16 +280,16 @@ def _start_ray(scratch, i, d, ray):
 @kernel
 def _start_on_edge(scratch, i, d, row):
     """``_start_ray`` for a point on or near an edge, whose start is written."""
-    begin, stop = get(scratch.numbers, _TABLE + i), OPEN
-    if np.int64(get(row, CODE)) & KNOWN != 0:
+    begin, stop = load(scratch.numbers, _TABLE + i), OPEN
+    if np.int64(load(row, CODE)) & KNOWN != 0:
         stop = UNSURE
         if begin >= 0:
-            stop = stop_of(at(scratch.points, _FAN + begin), d, make_holders(scratch.trace.holders))
+            stop = stop_of(offset(scratch.points, _FAN + begin), d, make_holders(scratch.trace.holders))
     if stop == OPEN:
         # Nothing is left to be decided at the start.
-        put(row, CODE, np.float64(np.int64(get(row, CODE)) & BARYCENTRIC))
-        if get(scratch.numbers, _CORNER + i) != 0:
-            put(row, SLACK, CORNER)
+        store(row, CODE, np.float64(np.int64(load(row, CODE)) & BARYCENTRIC))
+        if load(scratch.numbers, _CORNER + i) != 0:
+            store(row, SLACK, CORNER)
     return stop != STOPPED
 
 
@@ -304,7 +304,7 @@ def _aim(places, sky, scratch, k, count, listed, rays):
     for i in range(count):
         d, height, value = given, 1.0, weight
         if sky.turned:
-            frame = at(scratch.points, _FRAME + 9 * i)
+            frame = offset(scratch.points, _FRAME + 9 * i)
             across = add(scale(row3(frame, 0), given[0]), scale(row3(frame, 1), given[1]))
             d, height = add(across, scale(row3(frame, 2), given[2])), given[2]
         elif has_horizon:
@@ -312,16 +312,16 @@ def _aim(places, sky, scratch, k, count, listed, rays):
         if sky.cosine:
             # rule: cosine-weight
             value *= abs(height)
-        put(scratch.points, _WHOLE + i, get(scratch.points, _WHOLE + i) + value)
+        store(scratch.points, _WHOLE + i, load(scratch.points, _WHOLE + i) + value)
         # rule: open-above-horizon
         seen = height > 0.0 and _start_ray(scratch, i, d, rays)
         if seen:
             put3(scratch.directions, 3 * rays, d)
-            put(scratch.limits, rays, limit)
+            store(scratch.limits, rays, limit)
             if rays < TILE:
-                put(scratch.parallel.hiders, rays, get(scratch.numbers, _HIDER + i))
-        put(scratch.values, listed, value)
-        put(scratch.listed, listed, (k * TILE + i) * 2 + np.int64(seen))
+                store(scratch.parallel.hiders, rays, load(scratch.numbers, _HIDER + i))
+        store(scratch.values, listed, value)
+        store(scratch.listed, listed, (k * TILE + i) * 2 + np.int64(seen))
         listed += 1
         rays += np.int64(seen)
     return listed, rays
@@ -332,17 +332,17 @@ def _take_down(answers, scratch, listed):
     """Take down what the listed points see, once their rays are traced: for each point in the order of directions."""
     ray = np.int64(0)
     for entry in range(listed):
-        code, hides = get(scratch.listed, entry), True
+        code, hides = load(scratch.listed, entry), True
         if code & 1 != 0:
-            hides = get(scratch.found.hit, ray)
+            hides = load(scratch.found.hit, ray)
             if ray < TILE:
-                put(scratch.numbers, _HIDER + (code >> 1) % TILE, get(scratch.parallel.hiders, ray))
+                store(scratch.numbers, _HIDER + (code >> 1) % TILE, load(scratch.parallel.hiders, ray))
             ray += 1
         k, i = (code >> 1) // TILE, (code >> 1) % TILE
         if hides == answers.hidden:
-            put(scratch.points, _SUM + i, get(scratch.points, _SUM + i) + get(scratch.values, entry))
+            store(scratch.points, _SUM + i, load(scratch.points, _SUM + i) + load(scratch.values, entry))
         if hides and len(answers.bits) > 0:
-            row = get(scratch.numbers, _ROW + i)
+            row = load(scratch.numbers, _ROW + i)
             answers.bits[row, k >> 3] |= np.uint8(0x80 >> (k & 7))
 
 
@@ -352,9 +352,9 @@ def _end_tile(answers, scratch, count):
     if len(answers.sums) == 0:
         return
     for i in range(count):
-        total, whole = get(scratch.points, _SUM + i), get(scratch.points, _WHOLE + i)
+        total, whole = load(scratch.points, _SUM + i), load(scratch.points, _WHOLE + i)
         # Nothing counts where all directions lie in the horizon of a point that weighs them by the cosine.
-        answers.sums[get(scratch.numbers, _ROW + i)] = total / whole if answers.share and whole > 0.0 else total
+        answers.sums[load(scratch.numbers, _ROW + i)] = total / whole if answers.share and whole > 0.0 else total
 
 
 @inlined
@@ -366,7 +366,7 @@ def _trace(tree, scratch, rays, together):
     if together and rays > 0:
         if trace_parallel(tree, batch, scratch.found, rays, scratch.trace, scratch.parallel):
             return
-        put(scratch.numbers, _LEFT, get(scratch.numbers, _LEFT) - 1)
+        store(scratch.numbers, _LEFT, load(scratch.numbers, _LEFT) - 1)
     if tree.has_nodes:
         trace(tree, batch, scratch.found, 0, rays, scratch.trace, np.bool_(True))
     else:
@@ -376,7 +376,7 @@ def _trace(tree, scratch, rays, together):
 @kernel
 def _tile_from(rows, steps, begin):
     """The number of points of the tile that begins there: with steps given, up to the longest step of the curve."""
-    count = smaller(np.int64(TILE), len(rows) - begin)
+    count = minimum(np.int64(TILE), len(rows) - begin)
     if begin + count >= len(steps):
         return count
     longest, end = steps[begin + count], count
@@ -404,7 +404,7 @@ def sweep(descriptor, vertices, faces, places, sky, answers, rows, steps, begin,
         _begin_tile(tree, places, rows, begin, count, scratch)
     traced, parallel = np.int64(0), len(steps) > 0 and tree.has_nodes and not sky.turned and count >= _TOGETHER
     while k < len(sky.values) and traced < RAYS_A_CALL:
-        together = parallel and get(scratch.numbers, _LEFT) > 0
+        together = parallel and load(scratch.numbers, _LEFT) > 0
         listed, rays, most = np.int64(0), np.int64(0), count if together else np.int64(RAYS)
         while k < len(sky.values) and listed + count <= most:
             listed, rays = _aim(places, sky, scratch, k, count, listed, rays)

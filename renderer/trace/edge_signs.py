@@ -10,7 +10,7 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import exact_product, power_below
-from renderer.numerics.simd import get
+from renderer.numerics.simd import load
 
 # Below this a number is scaled up before its exponent is read, as a denormal one has none.
 _SMALL, _SCALE, _SCALE_BITS = 2.0**-900, 2.0**200, 200
@@ -21,7 +21,7 @@ _FRACTION_BITS, _BIAS = 52, 1023
 @inlined
 def coordinate(tree, at):
     """One coordinate of a block, exactly."""
-    return get(tree.wide_blocks, at) if tree.wide != 0 else np.float64(get(tree.blocks, at))
+    return load(tree.wide_blocks, at) if tree.wide != 0 else np.float64(load(tree.blocks, at))
 
 
 @inlined

@@ -19,7 +19,7 @@ from renderer.numerics.double_double import (
     product,
     scaled_difference,
 )
-from renderer.numerics.simd import get, larger, pointer, put, smaller
+from renderer.numerics.simd import load, maximum, minimum, pointer, store
 from renderer.numerics.vec3 import dot, largest_component, largest_of_three, row3, scale, sub, three
 from renderer.trace.intersect import CORNER, ROOM
 from renderer.trace.starts.record import EDGE, SLACK, slack_of, start_pointers
@@ -49,20 +49,20 @@ def bound_errors(vertices, faces, rays, rows, t, face, errors, begin, end, unit)
     origin_step, direction_step = 3 * np.int64(len(rays.origins) > 1), 3 * np.int64(len(rays.directions) > 1)
     origins, directions, corners = pointer(rays.origins), pointer(rays.directions), pointer(vertices)
     for i in range(begin, end):
-        error, row = np.nan, get(pointer(face), i)
+        error, row = np.nan, load(pointer(face), i)
         if row >= 0:
-            ray = i if own else get(pointer(rows), i)
+            ray = i if own else load(pointer(rows), i)
             o = scale(three(origins, ray * origin_step), unit)
             d = three(directions, ray * direction_step)
             a, b, c = row3(pointer(faces), row)
             p0, p1, p2 = row3(corners, a), row3(corners, b), row3(corners, c)
-            p0, p1, p2, at = scale(p0, unit), scale(p1, unit), scale(p2, unit), get(pointer(t), i) * unit
-            off = _off(o, get(starts.rows, ray * starts.step + SLACK))
+            p0, p1, p2, at = scale(p0, unit), scale(p1, unit), scale(p2, unit), load(pointer(t), i) * unit
+            off = _off(o, load(starts.rows, ray * starts.step + SLACK))
             plane = _plane_error(p0, p1, p2, o, d, at, off)
             box = _box_error(sub(p0, o), sub(p1, o), sub(p2, o), d, at, off)
             # False for NaN too, of a plane of which nothing is known.
             error = ((plane if plane < box else box) * _MORE + _LEAST) / unit + _LEAST
-        put(pointer(errors), i, error)
+        store(pointer(errors), i, error)
 
 
 @inlined
@@ -82,15 +82,15 @@ def _plane_error(p0, p1, p2, o, d, t, off):
     scaled by powers of two to less than 4, so that no product overflows.
     """
     reach = largest_of_three(sub(p0, o), sub(p1, o), sub(p2, o))
-    side = larger(largest_component(sub(p1, p0)), largest_component(sub(p2, p0)))
-    far, side = power_below(larger(reach, _LEAST_NORMAL)), power_below(larger(side, _LEAST_NORMAL))
+    side = maximum(largest_component(sub(p1, p0)), largest_component(sub(p2, p0)))
+    far, side = power_below(maximum(reach, _LEAST_NORMAL)), power_below(maximum(side, _LEAST_NORMAL))
     unit = power_below(largest_component(d))
     corner, d, t = scaled_difference(p0, o, 1.0 / far), scale(d, 1.0 / unit), t * unit / far
     one, other = scaled_difference(p1, p0, 1.0 / side), scaled_difference(p2, p0, 1.0 / side)
     normal, sizes = cross_pairs(one, other), _cross_sizes(_sizes(heads(one)), _sizes(heads(other)))
     slope = dot_pairs(normal, as_pairs(d))
     left = minus(dot_pairs(normal, corner), product(slope, (t, 0.0)))[0]
-    vanished = _VANISHED / smaller(1.0, smaller(far, side))
+    vanished = _VANISHED / minimum(1.0, minimum(far, side))
     slope_error = _PAIRS * dot(sizes, _sizes(d)) + vanished
     left_error = _PAIRS * dot(sizes, _sizes(heads(corner))) + vanished + t * slope_error
     x, y, z = _sizes(heads(normal))
@@ -120,14 +120,14 @@ def _box_error(q0, q1, q2, d, t, off):
     """
     largest, first, last, before, behind = 0.0, -np.inf, np.inf, -np.inf, np.inf
     for k in range(3):
-        low, high = smaller(q0[k], smaller(q1[k], q2[k])) - off, larger(q0[k], larger(q1[k], q2[k])) + off
+        low, high = minimum(q0[k], minimum(q1[k], q2[k])) - off, maximum(q0[k], maximum(q1[k], q2[k])) + off
         near, far = _meet_slab(low, high, d[k])
         if abs(d[k]) > largest:
             largest, before, behind = abs(d[k]), near, far
-        first, last = larger(first, near), smaller(last, far)
+        first, last = maximum(first, near), minimum(last, far)
     if first > last:
         first, last = before, behind
-    return larger(abs(t - first), abs(last - t))
+    return maximum(abs(t - first), abs(last - t))
 
 
 @inlined

@@ -10,16 +10,16 @@ import numpy as np
 from renderer.jit.decorators import inlined
 from renderer.numerics.simd import (
     extract,
-    get,
+    fabs,
     is_negative,
-    larger,
+    load,
     load4,
     load8,
-    magnitude,
+    maximum,
+    minimum,
     movemask,
     narrow,
     select,
-    smaller,
     splat4,
     splat8,
     unlikely,
@@ -72,8 +72,8 @@ def round_up(x):
     Of NaN it is the least float32.
     """
     # No branch, here and below: whether a random ray takes it cannot be predicted.
-    y = larger(-LARGEST_FLOAT, narrow(x))
-    return y + select(widen(y) < x, magnitude(y) * _STEP + _TINY, np.float32(0.0))
+    y = maximum(-LARGEST_FLOAT, narrow(x))
+    return y + select(widen(y) < x, fabs(y) * _STEP + _TINY, np.float32(0.0))
 
 
 @inlined
@@ -82,8 +82,8 @@ def round_down(x):
 
     Of NaN it is the largest float32.
     """
-    y = smaller(LARGEST_FLOAT, narrow(x))
-    return y - select(widen(y) > x, magnitude(y) * _STEP + _TINY, np.float32(0.0))
+    y = minimum(LARGEST_FLOAT, narrow(x))
+    return y - select(widen(y) > x, fabs(y) * _STEP + _TINY, np.float32(0.0))
 
 
 @inlined
@@ -99,9 +99,9 @@ def round_both(x, room):
 
     The least float32 is never above +inf nor the greatest below -inf, so no difference with either is NaN.
     """
-    y = larger(-LARGEST_FLOAT, smaller(LARGEST_FLOAT, narrow(x)))
+    y = maximum(-LARGEST_FLOAT, minimum(LARGEST_FLOAT, narrow(x)))
     # rule: origin-bounds
-    step = magnitude(y) * (_STEP * _MORE) + room
+    step = fabs(y) * (_STEP * _MORE) + room
     return y - step, y + step
 
 
@@ -112,7 +112,7 @@ def face_range(a, b, c):
     Every box around the face contains this one. It is wider than the corners by ROOM on each side, because a ray that
     hits the face in float64 may pass it by that much.
     """
-    low, high = smaller(a, smaller(b, c)), larger(a, larger(b, c))
+    low, high = minimum(a, minimum(b, c)), maximum(a, maximum(b, c))
     room = (high - low) * ROOM
     return round_down(low - room), round_up(high + room)
 
@@ -144,7 +144,7 @@ class Ray(NamedTuple):
 @inlined
 def largest_of(ray):
     """The largest component of a ray's direction, without its sign."""
-    return larger(larger(magnitude(ray.dx), magnitude(ray.dy)), magnitude(ray.dz))
+    return maximum(maximum(fabs(ray.dx), fabs(ray.dy)), fabs(ray.dz))
 
 
 class Slabs(NamedTuple):
@@ -183,7 +183,7 @@ def make_slab(axis, o, d, largest, room):
     """
     inverse, back = narrow(largest / d), is_negative(d)
     down, up = round_both(o, room)
-    near_inverse = smaller(larger(inverse, -LARGEST_FLOAT), LARGEST_FLOAT)
+    near_inverse = minimum(maximum(inverse, -LARGEST_FLOAT), LARGEST_FLOAT)
     low, high = np.int64(16 * axis), np.int64(16 * axis + 8)
     return (
         select(back, high, low), select(back, low, high), select(back, down, up), select(back, up, down),
@@ -276,7 +276,7 @@ def make_shear(ray):
 @inlined
 def longest_axis(ray):
     """Two bools: the largest component of the direction is z; else it is y. Neither means x."""
-    ax, ay, az = magnitude(ray.dx), magnitude(ray.dy), magnitude(ray.dz)
+    ax, ay, az = fabs(ray.dx), fabs(ray.dy), fabs(ray.dz)
     return (az >= ax) & (az >= ay), ay >= ax
 
 
@@ -349,7 +349,7 @@ def see_triangles(tree, base, ray):
     e0 = x2 * y1 - y2 * x1
     e1 = x0 * y2 - y0 * x2
     e2 = x1 * y0 - y1 * x0
-    least, most = smaller(e0, smaller(e1, e2)), larger(e0, larger(e1, e2))
+    least, most = minimum(e0, minimum(e1, e2)), maximum(e0, maximum(e1, e2))
     # rule: inside-edges
     seen = movemask((least >= zero) | (most <= zero))
     return Edges(x0, x1, x2, y0, y1, y2, z0, z1, z2, e0, e1, e2, least, most, e0 + e1 + e2), seen
@@ -366,9 +366,9 @@ class _Sizes(NamedTuple):
 
 @inlined
 def _sizes_of(edges):
-    wide = magnitude(edges.x0) + magnitude(edges.x1) + magnitude(edges.x2)
-    high = magnitude(edges.y0) + magnitude(edges.y1) + magnitude(edges.y2)
-    along = magnitude(edges.z0) + magnitude(edges.z1) + magnitude(edges.z2)
+    wide = fabs(edges.x0) + fabs(edges.x1) + fabs(edges.x2)
+    high = fabs(edges.y0) + fabs(edges.y1) + fabs(edges.y2)
+    along = fabs(edges.z0) + fabs(edges.z1) + fabs(edges.z2)
     return _Sizes(wide, high, wide + high, along)
 
 
@@ -398,11 +398,11 @@ def meet_planes(tree, base, edges, seen, ray, t_min, t_max):
     """The ``PlaneHits`` of the triangles of the block at ``base``; only those ``seen`` have bits."""
     sizes, numerator = _sizes_of(edges), _numerator(edges)
     denominator = edges.determinant * splat4(ray.direction_z)
-    t, height = numerator / denominator, magnitude(numerator)
+    t, height = numerator / denominator, fabs(numerator)
     product = sizes.across * (sizes.across + sizes.along)
     limit, reach = product * sizes.along * splat4(DOUBT), product * splat4(ray.slack)
-    slant = product * (magnitude(edges.z1 - edges.z0) + magnitude(edges.z2 - edges.z0)) * splat4(SLANT)
-    determinant_uncertain = magnitude(edges.determinant) * sizes.along <= larger(limit, slant)
+    slant = product * (fabs(edges.z1 - edges.z0) + fabs(edges.z2 - edges.z0)) * splat4(SLANT)
+    determinant_uncertain = fabs(edges.determinant) * sizes.along <= maximum(limit, slant)
     near, zero = height <= limit + reach, splat4(0.0)
     # Of those seen, an edge function is 0 where the least or the most is.
     some = seen & movemask(determinant_uncertain | near | (edges.least == zero) | (edges.most == zero))
@@ -414,7 +414,7 @@ def meet_planes(tree, base, edges, seen, ray, t_min, t_max):
             uncertain = determinant_uncertain | near | _may_be_on_edge(edges)
             # Whether the numerator, with its error, may make a t from t_min to t_max. A t that rounding made negative
             # may be 0.
-            base_t, error = magnitude(denominator), product * sizes.along * splat4(ERROR)
+            base_t, error = fabs(denominator), product * sizes.along * splat4(ERROR)
             within = (height + error >= splat4(t_min) * base_t) & (height - error <= splat4(t_max) * base_t)
             ahead, extended = (t >= zero) | (height <= error), _is_extended(edges, sizes)
             # rule: must-resolve
@@ -435,7 +435,7 @@ def _left(tree, base, edges, ray):
     """
     slot, bits = base // BLOCK_WORDS * BLOCK_FACES, np.int64(0)
     for i in range(BLOCK_FACES):
-        bits |= np.int64(np.float64(get(tree.faces, slot + i)) == ray.leaving) << i
+        bits |= np.int64(np.float64(load(tree.faces, slot + i)) == ray.leaving) << i
     if ray.slack == CORNER:
         zero = splat4(0.0)
         at0 = (edges.x0 == zero) & (edges.y0 == zero) & (edges.z0 == zero)
@@ -469,7 +469,7 @@ def _may_be_on_edge(edges):
 @inlined
 def near_planes(edges, slack):
     """The bits of the triangles whose planes are within a ray's ``slack`` of its origin, or of rounding."""
-    sizes, height = _sizes_of(edges), magnitude(_numerator(edges))
+    sizes, height = _sizes_of(edges), fabs(_numerator(edges))
     error = splat4(slack) + sizes.along * splat4(ERROR)
     return movemask(height <= sizes.across * (sizes.across + sizes.along) * error)
 

@@ -10,13 +10,13 @@ from renderer.numerics.simd import (
     extract,
     float32_pointer,
     float64_pointer,
-    get,
     int32_pointer,
+    load,
     load8,
     lowest_bit,
+    minimum,
     movemask,
     pointer,
-    smaller,
     splat8,
 )
 from renderer.trace.best import NO_FACE, Best, hit_on, is_better, no_hit
@@ -57,17 +57,17 @@ class TreePointers(NamedTuple):
 def tree_pointers(descriptor):
     """The pointers in ``Tree.descriptor``, whose tree the caller must keep alive."""
     at = pointer(descriptor)
-    nodes, blocks = get(at, NODES), get(at, BLOCKS)
+    nodes, blocks = load(at, NODES), load(at, BLOCKS)
     return TreePointers(
         float32_pointer(nodes),
         int32_pointer(nodes),
         float32_pointer(blocks),
         float64_pointer(blocks),
-        get(at, WIDE),
-        int32_pointer(get(at, FACES)),
-        get(at, BLOCK_COUNT),
-        get(at, DEPTH) > 0,
-        double_of(get(at, SCALE)),
+        load(at, WIDE),
+        int32_pointer(load(at, FACES)),
+        load(at, BLOCK_COUNT),
+        load(at, DEPTH) > 0,
+        double_of(load(at, SCALE)),
     )
 
 
@@ -103,7 +103,7 @@ def nearest_in_blocks(tree, first, count, t_min, shear, best):
             i = lowest_bit(bits)
             bits &= bits - 1
             ti = extract(hits.t, i)
-            fi = get(tree.faces, block * BLOCK_FACES + i)
+            fi = load(tree.faces, block * BLOCK_FACES + i)
             # rule: tie-in-blocks
             if ti >= t_min and (ti < t or (ti == t and fi < face)):
                 t, face, u, v, w = ti, fi, extract(hits.u, i), extract(hits.v, i), extract(hits.w, i)
@@ -119,7 +119,7 @@ def nearest_carefully(tree, first, count, ray, shear, best):
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
-            face, hit = get(tree.faces, block * BLOCK_FACES + i), resolved_hit(tree, block, hits, i, ray, shear)
+            face, hit = load(tree.faces, block * BLOCK_FACES + i), resolved_hit(tree, block, hits, i, ray, shear)
             if is_better(hit.t, face, ray.t_min, best):
                 best = hit_on(face, hit)
     return best
@@ -140,7 +140,7 @@ def search_all_blocks(tree, ray, t_max, any_hit):
     """The best hit over all blocks, and whether an uncertain one must be resolved; with ``any_hit`` it may be any."""
     shear, best, unresolved = make_shear(ray), no_hit(t_max), False
     for first in range(0, tree.count, _BLOCKS_AT_ONCE):
-        count = smaller(_BLOCKS_AT_ONCE, tree.count - first)
+        count = minimum(_BLOCKS_AT_ONCE, tree.count - first)
         best, some = nearest_in_blocks(tree, first, count, ray.t_min, shear, best)
         unresolved = unresolved or some
         if any_hit and best.face != NO_FACE:

@@ -14,17 +14,17 @@ from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import (
     count_bits,
     extract,
-    get,
-    larger,
-    least,
+    load,
     load8,
     lowest_bit,
-    most,
+    maximum,
+    minimum,
     movemask,
-    put,
+    reduce_max,
+    reduce_min,
     select,
-    smaller,
     splat8,
+    store,
 )
 from renderer.trace.intersect import FAR_PADDING
 from renderer.trace.layout import CHILDREN, NODE_WORDS
@@ -95,34 +95,34 @@ class Beam(NamedTuple):
 @inlined
 def _least(floats, row):
     a, b = load8(floats, row), load8(floats, row + 8)
-    return least(select(a < b, a, b))
+    return reduce_min(select(a < b, a, b))
 
 
 @inlined
 def _most(floats, row):
     a, b = load8(floats, row), load8(floats, row + 8)
-    return most(select(a > b, a, b))
+    return reduce_max(select(a > b, a, b))
 
 
 @inlined
 def lowest_origin(floats, axis):
     row = axis * WIDTH
-    return smaller(_least(floats, NEAR_ORIGIN + row), _least(floats, FAR_ORIGIN + row))
+    return minimum(_least(floats, NEAR_ORIGIN + row), _least(floats, FAR_ORIGIN + row))
 
 
 @inlined
 def highest_origin(floats, axis):
     row = axis * WIDTH
-    return larger(_most(floats, NEAR_ORIGIN + row), _most(floats, FAR_ORIGIN + row))
+    return maximum(_most(floats, NEAR_ORIGIN + row), _most(floats, FAR_ORIGIN + row))
 
 
 @inlined
 def make_beam(rays):
     """The beam around sixteen rays; its axis is that of the first one."""
     floats = rays.floats
-    w = get(rays.integers, BLOCK_ROW + 2 * WIDTH) >> 2
+    w = load(rays.integers, BLOCK_ROW + 2 * WIDTH) >> 2
     u, v = (w + 1) % 3, (w + 2) % 3
-    forward = get(rays.doubles, DIRECTION_Z) > 0.0
+    forward = load(rays.doubles, DIRECTION_Z) > 0.0
     flip = 0 if forward else 8
     low_w, high_w = lowest_origin(floats, w), highest_origin(floats, w)
     least_u, most_u = _least(floats, SLOPE_U), _most(floats, SLOPE_U)
@@ -172,7 +172,7 @@ def meet_box(nodes, at, floats, half):
     """The bits of eight rays, from ``half`` on, that meet the octant whose first word is ``at``: ``enter_boxes``."""
     t0, t1 = load8(floats, LOWER + half), load8(floats, LIMIT + half)
     for axis in range(3):
-        low, high = splat8(get(nodes, at + 16 * axis)), splat8(get(nodes, at + 16 * axis + 8))
+        low, high = splat8(load(nodes, at + 16 * axis)), splat8(load(nodes, at + 16 * axis + 8))
         row = axis * WIDTH + half
         inverse = load8(floats, NEAR_INVERSE + row)
         forward = inverse > splat8(np.float32(0.0))
@@ -189,9 +189,9 @@ def _middle_entry(nodes, base, beam, rays, t0):
     floats, middle = rays.floats, WIDTH // 2
     for row in (beam.row_u, beam.row_v):
         axis = row >> 4
-        inverse = get(floats, NEAR_INVERSE + axis * WIDTH + middle)
+        inverse = load(floats, NEAR_INVERSE + axis * WIDTH + middle)
         near = row + (8 if inverse < 0.0 else 0)
-        n = (load8(nodes, base + near) - splat8(get(floats, NEAR_ORIGIN + axis * WIDTH + middle))) * splat8(inverse)
+        n = (load8(nodes, base + near) - splat8(load(floats, NEAR_ORIGIN + axis * WIDTH + middle))) * splat8(inverse)
         t0 = select(n > t0, n, t0)
     return t0
 
@@ -208,7 +208,7 @@ def push_sorted(node, bits, t0, key, stack, top):
         k = splat8(extract(key, i))
         before, after = movemask(key >= k) & ((1 << i) - 1), movemask(key > k) & (0xFF << (i + 1))
         place = count_bits((before | after) & bits) if (bits >> i) & 1 else 8
-        put(stack, top + place, make_entry(extract(t0, i), node * 8 + i))
+        store(stack, top + place, make_entry(extract(t0, i), node * 8 + i))
     return top + count_bits(bits)
 
 
@@ -217,7 +217,7 @@ def _push_all(node, bits, t0, stack, top):
     while bits != 0:
         i = lowest_bit(bits)
         bits &= bits - 1
-        put(stack, top, make_entry(extract(t0, i), node * 8 + i))
+        store(stack, top, make_entry(extract(t0, i), node * 8 + i))
         top += 1
     return top
 
@@ -227,7 +227,7 @@ def _next_octant(stack, top, limit):
     """The uppermost octant of the stack that is not beyond the limit, or -1, and the top below it."""
     while top > 0:
         top -= 1
-        entry = get(stack, top)
+        entry = load(stack, top)
         if distance_of(entry) <= limit:
             return octant_of(entry), top
     return -1, top
@@ -237,7 +237,7 @@ def _next_octant(stack, top, limit):
 def child_of(tree, octant):
     """The node or leaf of the octant with number 8 * node + place, and the octant's first word."""
     base, place = (octant >> 3) * NODE_WORDS, octant & 7
-    return np.int64(get(tree.links, base + CHILDREN + place)), base + place
+    return np.int64(load(tree.links, base + CHILDREN + place)), base + place
 
 
 @inlined
@@ -297,6 +297,6 @@ def test_leaf(tree, rays, meeting, leaf, any_hit):
         unresolved |= np.int64(must_resolve) << r
         if any_hit and hit:
             # A limit that no box lies within: the ray meets no further one.
-            put(rays.floats, LIMIT + r, np.float32(-np.inf))
-            put(rays.integers, CHILD + r, leaf)
+            store(rays.floats, LIMIT + r, np.float32(-np.inf))
+            store(rays.integers, CHILD + r, leaf)
     return unresolved

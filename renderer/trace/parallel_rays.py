@@ -13,18 +13,17 @@ from numpy.typing import NDArray
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import (
     address,
-    alike,
-    at,
+    broadcast_like,
     float32_pointer,
     gather8,
-    get,
     int32_pointer,
-    larger,
+    load,
     lowest_bit,
+    maximum,
+    minimum,
+    offset,
     pointer,
     prefetch,
-    put,
-    smaller,
     splat8,
     store,
 )
@@ -100,16 +99,16 @@ def parallel_pointers(scratch):
     """The ``ParallelPointers`` into a ``ParallelScratch``."""
     nodes, integers, rays = address(scratch.nodes), pointer(scratch.integers), scratch.rays
     return ParallelPointers(
-        float32_pointer(nodes), int32_pointer(nodes), at(integers, 2 * rays), integers, at(integers, rays)
+        float32_pointer(nodes), int32_pointer(nodes), offset(integers, 2 * rays), integers, offset(integers, rays)
     )
 
 
 @inlined
 def _prepare_direction(rays, prepared):
     """Prepare the first ray sixteen times: all but its origin is that of every ray. Returns its beam."""
-    numbers = at(prepared.integers, NUMBER)
+    numbers = offset(prepared.integers, NUMBER)
     for r in range(WIDTH):
-        put(numbers, r, 0)
+        store(numbers, r, 0)
     for half in range(0, WIDTH, 8):
         prepare_eight(rays, prepared, half, numbers)
     return make_beam(prepared)
@@ -121,26 +120,26 @@ def _prepare_origins(rays, prepared, live, first, count, t_max, limit):
     there are fewer. ``t_max`` and ``limit`` are T and LIMIT of a ray that has hit nothing.
     """
     floats, doubles, integers = prepared.floats, prepared.doubles, prepared.integers
-    w = get(integers, BLOCK_ROW + 2 * WIDTH) >> 2
+    w = load(integers, BLOCK_ROW + 2 * WIDTH) >> 2
     for r in range(WIDTH):
-        put(integers, NUMBER + r, get(live, smaller(first + r, count - 1)))
+        store(integers, NUMBER + r, load(live, minimum(first + r, count - 1)))
     for half in range(0, WIDTH, 8):
-        numbers = at(integers, NUMBER + half)
+        numbers = offset(integers, NUMBER + half)
         slack, leaving = starts8(rays.starts, numbers)
         room = room_of(slack)
         for axis in range(3):
             o = gather8(rays.origins, numbers, rays.origin_step, axis) * rays.scale
             far, near = round_both(o, room)
-            if get(floats, NEAR_INVERSE + axis * WIDTH) < 0.0:
+            if load(floats, NEAR_INVERSE + axis * WIDTH) < 0.0:
                 near, far = far, near
             store(floats, NEAR_ORIGIN + axis * WIDTH + half, near)
             store(floats, FAR_ORIGIN + axis * WIDTH + half, far)
             store(doubles, ORIGIN + (axis + 2 - w) % 3 * WIDTH + half, o)
         store(doubles, SLACK + half, slack)
         store(doubles, LEAVING + half, leaving)
-        store(doubles, T + half, alike(t_max, o))
+        store(doubles, T + half, broadcast_like(t_max, o))
         store(floats, LIMIT + half, splat8(limit))
-        store(integers, FACE + half, alike(np.int64(NO_FACE), o))
+        store(integers, FACE + half, broadcast_like(np.int64(NO_FACE), o))
 
 
 @inlined
@@ -158,10 +157,10 @@ def _bounds(rays, live, count, axis):
     """The range of the origins of the rays ``live``, float32 and rounded outwards: rounding is monotone."""
     low, high = np.inf, -np.inf
     for j in range(count):
-        i = get(live, j)
-        o = get(rays.origins, i * rays.origin_step + axis) * rays.scale
-        slack = get(rays.starts.rows, i * rays.starts.step + START_SLACK)
-        low, high = smaller(low, o - slack), larger(high, o + slack)
+        i = load(live, j)
+        o = load(rays.origins, i * rays.origin_step + axis) * rays.scale
+        slack = load(rays.starts.rows, i * rays.starts.step + START_SLACK)
+        low, high = minimum(low, o - slack), maximum(high, o + slack)
     return round_both(low, room_of(0.0))[0], round_both(high, room_of(0.0))[1]
 
 
@@ -187,8 +186,8 @@ def _list_leaf(tree, parallel, place, octant, child):
     """Copy the box whose first word is ``octant`` to the list, with its leaf."""
     base = (place >> 3) * NODE_WORDS + (place & 7)
     for row in range(6):
-        put(parallel.nodes, base + 8 * row, get(tree.nodes, octant + 8 * row))
-    put(parallel.links, base + CHILDREN, np.int32(child))
+        store(parallel.nodes, base + 8 * row, load(tree.nodes, octant + 8 * row))
+    store(parallel.links, base + CHILDREN, np.int32(child))
 
 
 @inlined
@@ -198,8 +197,8 @@ def _end_list(parallel, listed):
     while place & 7 != 0:
         base = (place >> 3) * NODE_WORDS + (place & 7)
         for row in range(6):
-            put(parallel.nodes, base + 8 * row, np.float32(-np.inf) if row & 1 else np.float32(np.inf))
-        put(parallel.links, base + CHILDREN, np.int32(UNUSED))
+            store(parallel.nodes, base + 8 * row, np.float32(-np.inf) if row & 1 else np.float32(np.inf))
+        store(parallel.links, base + CHILDREN, np.int32(UNUSED))
         place += 1
 
 
@@ -212,17 +211,17 @@ def _list_leaves(tree, beam, limit, parallel, top):
     while top > 0 and listed + 8 <= LISTED:
         top -= 1
         entered += 1
-        base = get(parallel.waiting, top) * NODE_WORDS
+        base = load(parallel.waiting, top) * NODE_WORDS
         _, bits = enter_beam(tree.nodes, base, beam, limit)
         while bits != 0:
             octant = base + lowest_bit(bits)
             bits &= bits - 1
-            child = np.int64(get(tree.links, octant + CHILDREN))
+            child = np.int64(load(tree.links, octant + CHILDREN))
             if child < 0:
                 _list_leaf(tree, parallel, listed, octant, child)
                 listed += 1
             else:
-                put(parallel.waiting, top, child)
+                store(parallel.waiting, top, child)
                 top += 1
                 for line in range(0, NODE_WORDS, _LINE):
                     prefetch(tree.nodes, child * NODE_WORDS + line)
@@ -235,7 +234,7 @@ def _list_leaves(tree, beam, limit, parallel, top):
 def _test_list(tree, prepared, parallel, listed, beam):
     """Test sixteen prepared rays against the leaves of the list; returns the bits of those with hits to resolve."""
     beam, floats, unresolved = _beam_of_sixteen(prepared.floats, beam), prepared.floats, np.int64(0)
-    limit = get(floats, LIMIT)
+    limit = load(floats, LIMIT)
     for base in range(0, (listed + 7) // 8 * NODE_WORDS, NODE_WORDS):
         _, bits = enter_beam(parallel.nodes, base, beam, limit)
         while bits != 0:
@@ -243,7 +242,7 @@ def _test_list(tree, prepared, parallel, listed, beam):
             bits &= bits - 1
             meeting = meet_box(parallel.nodes, octant, floats, 0) | (meet_box(parallel.nodes, octant, floats, 8) << 8)
             if meeting != 0:
-                leaf = np.int64(get(parallel.links, octant + CHILDREN))
+                leaf = np.int64(load(parallel.links, octant + CHILDREN))
                 unresolved |= test_leaf(tree, prepared, meeting, leaf, True)
     return unresolved
 
@@ -255,14 +254,14 @@ def _keep_live(tree, rays, found, scratch, parallel, some, unresolved, kept):
     """
     integers = scratch.prepared.integers
     for r in range(some):
-        i = get(integers, NUMBER + r)
-        hidden, sure = get(integers, FACE + r) != NO_FACE, False
+        i = load(integers, NUMBER + r)
+        hidden, sure = load(integers, FACE + r) != NO_FACE, False
         if hidden:
-            put(parallel.hiders, i, get(integers, CHILD + r))
+            store(parallel.hiders, i, load(integers, CHILD + r))
         elif (unresolved >> r) & 1 != 0:
             hidden, sure = _is_hidden(tree, rays, scratch, i), True
-        put(found.hit, i, hidden)
-        put(parallel.live, kept, i)
+        store(found.hit, i, hidden)
+        store(parallel.live, kept, i)
         kept += np.int64(not (hidden or sure))
     return kept
 
@@ -279,7 +278,7 @@ def _test_rays(tree, rays, found, scratch, parallel, count, listed, beam, t_max,
     prepared, kept = scratch.prepared, np.int64(0)
     for first in range(0, count, WIDTH):
         _prepare_origins(rays, prepared, parallel.live, first, count, t_max, limit)
-        unresolved, some = _test_list(tree, prepared, parallel, listed, beam), smaller(count - first, np.int64(WIDTH))
+        unresolved, some = _test_list(tree, prepared, parallel, listed, beam), minimum(count - first, np.int64(WIDTH))
         kept = _keep_live(tree, rays, found, scratch, parallel, some, unresolved, kept)
     return kept
 
@@ -291,9 +290,9 @@ def _try_hiders(tree, rays, found, scratch, parallel, count, t_max):
     """
     shear, kept = shear_of(scratch.prepared, 0), np.int64(0)
     for i in range(count):
-        leaf, hidden = get(parallel.hiders, i), False
-        if get(rays.starts.rows, i * rays.starts.step + START_SLACK) == EDGE:
-            put(found.hit, i, _is_hidden(tree, rays, scratch, i))
+        leaf, hidden = load(parallel.hiders, i), False
+        if load(rays.starts.rows, i * rays.starts.step + START_SLACK) == EDGE:
+            store(found.hit, i, _is_hidden(tree, rays, scratch, i))
             continue
         if leaf < 0:
             first, blocks = blocks_of(leaf)
@@ -301,9 +300,9 @@ def _try_hiders(tree, rays, found, scratch, parallel, count, t_max):
             # rule: hider-is-tested
             hidden = best.face != NO_FACE
         # Asked once more only where it hid the last ray: elsewhere that would cost open rays more than it saves.
-        put(parallel.hiders, i, leaf if hidden else np.int64(0))
-        put(found.hit, i, hidden)
-        put(parallel.live, kept, i)
+        store(parallel.hiders, i, leaf if hidden else np.int64(0))
+        store(found.hit, i, hidden)
+        store(parallel.live, kept, i)
         kept += np.int64(not hidden)
     return kept
 
@@ -311,12 +310,12 @@ def _try_hiders(tree, rays, found, scratch, parallel, count, t_max):
 @inlined
 def _shear_from(rays, i, shear):
     """The ``Shear`` of ray ``i``, which has the direction of another one."""
-    o, row = at(rays.origins, i * rays.origin_step), at(rays.starts.rows, i * rays.starts.step)
+    o, row = offset(rays.origins, i * rays.origin_step), offset(rays.starts.rows, i * rays.starts.step)
     w = shear.row_z >> 2
-    x, y, z = get(o, (w + 1) % 3) * rays.scale, get(o, (w + 2) % 3) * rays.scale, get(o, w) * rays.scale
+    x, y, z = load(o, (w + 1) % 3) * rays.scale, load(o, (w + 2) % 3) * rays.scale, load(o, w) * rays.scale
     return Shear(
         shear.row_x, shear.row_y, shear.row_z, x, y, z, shear.shear_x, shear.shear_y, shear.direction_z,
-        get(row, START_SLACK), get(row, START_FACE),
+        load(row, START_SLACK), load(row, START_FACE),
     )  # fmt: skip
 
 
@@ -333,7 +332,7 @@ def trace_parallel(tree, rays, found, count, scratch, parallel):
     limit = box_limit(t_max, largest_of(ray))
     left = _try_hiders(tree, rays, found, scratch, parallel, count, t_max)
     # As long as nodes wait: list the next leaves, and test the rays that are left against them.
-    put(parallel.waiting, 0, 0)
+    store(parallel.waiting, 0, 0)
     top, entered = np.int64(1), np.int64(0)
     while top > 0 and left > 0:
         if entered > _MOST_NODES * count:

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined
-from renderer.numerics.simd import alike, get, narrow, put, select, store
+from renderer.numerics.simd import broadcast_like, load, narrow, select, store
 from renderer.trace.best import NO_FACE, Best
 from renderer.trace.intersect import Shear, Slabs, box_limit, largest_of, make_shear, make_slabs, round_down
 from renderer.trace.leaf import nearest_in_blocks
@@ -94,7 +94,7 @@ def prepare_ray(rays, r, ray, t_max):
     _put_axes(integers, NEAR_ROW + r, slabs.near_x, slabs.near_y, slabs.near_z)
     _put_axes(integers, BLOCK_ROW + r, shear.row_x, shear.row_y, shear.row_z)
     store(doubles, T + r, t_max)
-    store(integers, FACE + r, alike(np.int64(NO_FACE), t_max))
+    store(integers, FACE + r, broadcast_like(np.int64(NO_FACE), t_max))
 
 
 @inlined
@@ -118,13 +118,14 @@ def slabs_of(rays, r):
     """The ray's ``Slabs``."""
     floats, integers = rays.floats, rays.integers
     row = NEAR_ROW + r
-    nx, ny, nz = get(integers, row), get(integers, row + WIDTH), get(integers, row + 2 * WIDTH)
+    nx, ny, nz = load(integers, row), load(integers, row + WIDTH), load(integers, row + 2 * WIDTH)
     return Slabs(
         nx, ny, nz, 8 - nx, 40 - ny, 72 - nz,
-        get(floats, NEAR_ORIGIN + r), get(floats, NEAR_ORIGIN + WIDTH + r), get(floats, NEAR_ORIGIN + 2 * WIDTH + r),
-        get(floats, FAR_ORIGIN + r), get(floats, FAR_ORIGIN + WIDTH + r), get(floats, FAR_ORIGIN + 2 * WIDTH + r),
-        get(floats, NEAR_INVERSE + r), get(floats, NEAR_INVERSE + WIDTH + r), get(floats, NEAR_INVERSE + 2 * WIDTH + r),
-        get(floats, FAR_INVERSE + r), get(floats, FAR_INVERSE + WIDTH + r), get(floats, FAR_INVERSE + 2 * WIDTH + r),
+        load(floats, NEAR_ORIGIN + r), load(floats, NEAR_ORIGIN + WIDTH + r), load(floats, NEAR_ORIGIN + 2 * WIDTH + r),
+        load(floats, FAR_ORIGIN + r), load(floats, FAR_ORIGIN + WIDTH + r), load(floats, FAR_ORIGIN + 2 * WIDTH + r),
+        load(floats, NEAR_INVERSE + r), load(floats, NEAR_INVERSE + WIDTH + r),
+        load(floats, NEAR_INVERSE + 2 * WIDTH + r),
+        load(floats, FAR_INVERSE + r), load(floats, FAR_INVERSE + WIDTH + r), load(floats, FAR_INVERSE + 2 * WIDTH + r),
     )  # fmt: skip
 
 
@@ -132,27 +133,27 @@ def slabs_of(rays, r):
 def shear_of(rays, r):
     doubles, integers = rays.doubles, rays.integers
     return Shear(
-        get(integers, BLOCK_ROW + r), get(integers, BLOCK_ROW + WIDTH + r), get(integers, BLOCK_ROW + 2 * WIDTH + r),
-        get(doubles, ORIGIN + r), get(doubles, ORIGIN + WIDTH + r), get(doubles, ORIGIN + 2 * WIDTH + r),
-        get(doubles, SHEAR + r), get(doubles, SHEAR + WIDTH + r), get(doubles, DIRECTION_Z + r),
-        get(doubles, SLACK + r), get(doubles, LEAVING + r),
+        load(integers, BLOCK_ROW + r), load(integers, BLOCK_ROW + WIDTH + r), load(integers, BLOCK_ROW + 2 * WIDTH + r),
+        load(doubles, ORIGIN + r), load(doubles, ORIGIN + WIDTH + r), load(doubles, ORIGIN + 2 * WIDTH + r),
+        load(doubles, SHEAR + r), load(doubles, SHEAR + WIDTH + r), load(doubles, DIRECTION_Z + r),
+        load(doubles, SLACK + r), load(doubles, LEAVING + r),
     )  # fmt: skip
 
 
 @inlined
 def best_of(rays, r):
     """The ``Best`` hit so far."""
-    doubles, face = rays.doubles, np.int32(get(rays.integers, FACE + r))
-    return Best(get(doubles, T + r), face, get(doubles, U + r), get(doubles, V + r), get(doubles, W + r))
+    doubles, face = rays.doubles, np.int32(load(rays.integers, FACE + r))
+    return Best(load(doubles, T + r), face, load(doubles, U + r), load(doubles, V + r), load(doubles, W + r))
 
 
 @inlined
 def put_best(rays, r, best):
-    put(rays.doubles, T + r, best.t)
-    put(rays.integers, FACE + r, np.int64(best.face))
-    put(rays.doubles, U + r, best.u)
-    put(rays.doubles, V + r, best.v)
-    put(rays.doubles, W + r, best.w)
+    store(rays.doubles, T + r, best.t)
+    store(rays.integers, FACE + r, np.int64(best.face))
+    store(rays.doubles, U + r, best.u)
+    store(rays.doubles, V + r, best.v)
+    store(rays.doubles, W + r, best.w)
 
 
 @inlined
@@ -162,9 +163,9 @@ def nearest_in_leaf(tree, rays, r, leaf):
     Returns whether the ray has any hit now, and whether an uncertain one must be resolved.
     """
     first, count = blocks_of(leaf)
-    t_min = get(rays.doubles, T_MIN + r)
+    t_min = load(rays.doubles, T_MIN + r)
     best, unresolved = nearest_in_blocks(tree, first, count, t_min, shear_of(rays, r), best_of(rays, r))
     # rule: weights-of-hit
     put_best(rays, r, best)
-    put(rays.floats, LIMIT + r, box_limit(best.t, get(rays.doubles, LARGEST + r)))
+    store(rays.floats, LIMIT + r, box_limit(best.t, load(rays.doubles, LARGEST + r)))
     return best.face != NO_FACE, unresolved

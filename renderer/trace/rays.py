@@ -8,20 +8,20 @@ from renderer.arguments.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import (
     address,
-    at,
     bool_pointer,
-    every8,
+    fabs,
     float64_pointer,
     gather8,
-    get,
     int64_pointer,
-    larger,
-    magnitude,
+    load,
+    load_strided8,
+    maximum,
+    minimum,
     movemask,
+    offset,
     pointer,
-    put,
     select,
-    smaller,
+    store,
 )
 from renderer.trace.best import NO_FACE
 from renderer.trace.intersect import Ray
@@ -102,7 +102,7 @@ def first_bad_ray(rays, begin, end):
         if i + 8 <= end and _are_good(rays, i):
             i += 8
             continue
-        for j in range(i, smaller(i + 8, end)):
+        for j in range(i, minimum(i + 8, end)):
             if not _is_good(rays, j):
                 return j
         i += 8
@@ -113,22 +113,22 @@ def first_bad_ray(rays, begin, end):
 def _are_good(rays, i):
     """Whether the eight rays from ``i`` on are in bounds. A comparison with NaN is false."""
     o, s, d, z = rays.origins, rays.origin_step, rays.directions, rays.direction_step
-    x, y, w = every8(o, i * s, s), every8(o, i * s + 1, s), every8(o, i * s + 2, s)
-    near = (magnitude(x) * rays.scale <= FARTHEST) & (magnitude(y) * rays.scale <= FARTHEST)
-    near = near & (magnitude(w) * rays.scale <= FARTHEST)
-    x, y, w = every8(d, i * z, z), every8(d, i * z + 1, z), every8(d, i * z + 2, z)
-    x, y, w = magnitude(x), magnitude(y), magnitude(w)
+    x, y, w = load_strided8(o, i * s, s), load_strided8(o, i * s + 1, s), load_strided8(o, i * s + 2, s)
+    near = (fabs(x) * rays.scale <= FARTHEST) & (fabs(y) * rays.scale <= FARTHEST)
+    near = near & (fabs(w) * rays.scale <= FARTHEST)
+    x, y, w = load_strided8(d, i * z, z), load_strided8(d, i * z + 1, z), load_strided8(d, i * z + 2, z)
+    x, y, w = fabs(x), fabs(y), fabs(w)
     good = near & (x <= LONGEST) & (y <= LONGEST) & (w <= LONGEST)
     # rule: range-of-eight
-    return movemask(good & (larger(larger(x, y), w) >= SHORTEST)) == 0xFF
+    return movemask(good & (maximum(maximum(x, y), w) >= SHORTEST)) == 0xFF
 
 
 @inlined
 def _is_good(rays, i):
     far, largest, odd = 0.0, 0.0, 0.0
     for k in range(3):
-        o, d = get(rays.origins, i * rays.origin_step + k), get(rays.directions, i * rays.direction_step + k)
-        far, largest = larger(far, abs(o)), larger(largest, abs(d))
+        o, d = load(rays.origins, i * rays.origin_step + k), load(rays.directions, i * rays.direction_step + k)
+        far, largest = maximum(far, abs(o)), maximum(largest, abs(d))
         # A NaN is never larger, but x - x is NaN for NaN and inf, and 0 otherwise.
         odd += (o - o) + (d - d)
     return odd == 0.0 and far * rays.scale <= FARTHEST and SHORTEST <= largest <= LONGEST
@@ -137,12 +137,12 @@ def _is_good(rays, i):
 @inlined
 def ray_at(rays, i):
     """Ray ``i`` in the tree's units, and its t_max."""
-    o, d = at(rays.origins, i * rays.origin_step), at(rays.directions, i * rays.direction_step)
-    origin, direction = (get(o, 0), get(o, 1), get(o, 2)), (get(d, 0), get(d, 1), get(d, 2))
-    row = at(rays.starts.rows, i * rays.starts.step)
+    o, d = offset(rays.origins, i * rays.origin_step), offset(rays.directions, i * rays.direction_step)
+    origin, direction = (load(o, 0), load(o, 1), load(o, 2)), (load(d, 0), load(d, 1), load(d, 2))
+    row = offset(rays.starts.rows, i * rays.starts.step)
     return _scaled(
-        origin, direction, get(rays.t_min, i * rays.min_step), get(rays.t_max, i * rays.max_step), rays.scale,
-        get(row, SLACK), get(row, FACE),
+        origin, direction, load(rays.t_min, i * rays.min_step), load(rays.t_max, i * rays.max_step), rays.scale,
+        load(row, SLACK), load(row, FACE),
     )  # fmt: skip
 
 
@@ -175,10 +175,10 @@ def starts8(starts, numbers):
 def _scaled(origin, direction, t_min, t_max, scale, slack, leaving):
     """Rays in the tree's units, whose ``scale`` is given, and their t_max."""
     # A t_min above 0 stays above 0 in the tree's units too, so that a hit at the origin is still too near.
-    t_min = select(t_min > 0.0, larger(t_min * scale, _TINIEST), t_min)
+    t_min = select(t_min > 0.0, maximum(t_min * scale, _TINIEST), t_min)
     ray = Ray(origin[0] * scale, origin[1] * scale, origin[2] * scale, *direction, t_min, slack, leaving)
     # A hit whose t is beyond the largest float64, in either unit, is none.
-    return ray, smaller(smaller(t_max, _MOST) * scale, _MOST)
+    return ray, minimum(minimum(t_max, _MOST) * scale, _MOST)
 
 
 @inlined
@@ -190,14 +190,14 @@ def write_hit(found, i, scale, best, dz, any_hit):
     t, face, u, v, w = best.t, best.face, best.u, best.v, best.w
     hit = face != NO_FACE
     if any_hit:
-        put(found.hit, i, hit)
+        store(found.hit, i, hit)
         return
     # + 0.0 turns -0.0 into 0.0.
     # rule: t-in-mesh-units
-    put(found.t, i, t / scale + 0.0 if hit else np.inf)
-    put(found.face, i, np.int64(face if hit else -1))
-    put(found.u, i, u / w + 0.0 if hit else np.nan)
-    put(found.v, i, v / w + 0.0 if hit else np.nan)
+    store(found.t, i, t / scale + 0.0 if hit else np.inf)
+    store(found.face, i, np.int64(face if hit else -1))
+    store(found.u, i, u / w + 0.0 if hit else np.nan)
+    store(found.v, i, v / w + 0.0 if hit else np.nan)
     # In this order, as those that keep no piles give the sides' memory for them.
-    put(found.pile, i, np.int64(face if hit else -1))
-    put(found.side, i, np.int64((1 if (w > 0.0) == (dz > 0.0) else -1) if hit else 0))
+    store(found.pile, i, np.int64(face if hit else -1))
+    store(found.side, i, np.int64((1 if (w > 0.0) == (dz > 0.0) else -1) if hit else 0))

@@ -23,7 +23,7 @@ from renderer.numerics.double_double import (
     scaled_difference,
 )
 from renderer.numerics.predicates import UNDECIDED, lies_within, slope_sign, volume_sign
-from renderer.numerics.simd import larger, local_doubles, smaller
+from renderer.numerics.simd import local_doubles, maximum, minimum
 from renderer.numerics.vec3 import add, cross, dot, largest_component, largest_of_three, length, normalized, scale, sub
 from renderer.trace.best import FaceHit
 from renderer.trace.edge_signs import coordinate, corners_at, exact_sides, passes_within
@@ -116,7 +116,7 @@ def _height_sign(tree, at, ray):
 def _scaled_normal(tree, at, ray):
     """The normal of a face as pairs, its sides scaled by a power of two."""
     p0, p1, p2 = corners_at(tree, at)
-    side = larger(largest_component(sub(p1, p0)), largest_component(sub(p2, p0)))
+    side = maximum(largest_component(sub(p1, p0)), largest_component(sub(p2, p0)))
     unit = 1.0 / power_below(side)
     return cross_pairs(scaled_difference(p1, p0, unit), scaled_difference(p2, p0, unit))
 
@@ -146,7 +146,7 @@ def _exact_t(tree, at, ray):
     """Where a ray meets the plane of a face, with twice the digits."""
     (p0, _, _), o, (d, d_unit) = corners_at(tree, at), _origin(ray), _direction(ray)
     way = sub(p0, o)
-    unit = power_below(larger(largest_component(way), _LEAST_NORMAL))
+    unit = power_below(maximum(largest_component(way), _LEAST_NORMAL))
     normal = _scaled_normal(tree, at, ray)
     height = dot_pairs(normal, scaled_difference(p0, o, 1.0 / unit))
     return quotient(height, dot_pairs(normal, as_pairs(d)))[0] * unit / d_unit
@@ -230,9 +230,9 @@ def _meet_face(tree, at, ray, least, most):
         return _meet_side(p0, p1, p2, o, d, least, most)
     if l1 >= l0:
         t, second, apex = _meet_side(p2, p0, p1, o, d, least, most)
-        return t, apex, larger(1.0 - second - apex, 0.0)
+        return t, apex, maximum(1.0 - second - apex, 0.0)
     t, second, apex = _meet_side(p1, p2, p0, o, d, least, most)
-    return t, larger(1.0 - second - apex, 0.0), second
+    return t, maximum(1.0 - second - apex, 0.0), second
 
 
 @kernel
@@ -267,7 +267,7 @@ def _meet_plane(face, normal, low, high):
     t = numerator[0] / determinant[0]
     t += minus(numerator, product(determinant, (t, 0.0)))[0] / determinant[0]
     # A ray in the plane meets the face where it comes to its outline.
-    t = smaller(t, high) if t > low else low
+    t = minimum(t, high) if t > low else low
     passed = minus(numerator, product(determinant, (t, 0.0)))[0]
     if not (low <= high and abs(passed) <= ROUNDING * length(n)):
         return np.nan, 0.0, 0.0
@@ -293,9 +293,9 @@ def _beyond(inward, corner, d, low, high):
     """Narrow low to high to where a ray is beyond a line through a corner, or ROUNDING before it."""
     least, rate = dot(inward, corner) - ROUNDING, dot(inward, d)
     if rate > 0.0:
-        return larger(low, least / rate), high
+        return maximum(low, least / rate), high
     if rate < 0.0:
-        return low, smaller(high, least / rate)
+        return low, minimum(high, least / rate)
     return low, (high if least <= 0.0 else -1.0)
 
 
@@ -318,18 +318,18 @@ def _weights(face, normal, t):
     square = dot(side, side)
     along, foot = _clamped(dot(side, point) / square, 0.0, 1.0), dot(side, other) / square
     # The place errs by some roundings, which are much of it near the ends.
-    room = _SLACK * larger(face.ratio, 1.0)
+    room = _SLACK * maximum(face.ratio, 1.0)
     before, behind = along + room, 1.0 - along + room
     rising = before / foot if before < foot else 1.0
     falling = behind / (1.0 - foot) if behind < 1.0 - foot else 1.0
     height = dot(cross(normal, side), point) / dot(normal, normal)
-    apex = _clamped(height, 0.0, smaller(rising, falling))
+    apex = _clamped(height, 0.0, minimum(rising, falling))
     return _clamped(along - apex * foot, 0.0, 1.0 - apex), apex
 
 
 @inlined
 def _clamped(x, low, high):
-    return smaller(larger(x, low), high)
+    return minimum(maximum(x, low), high)
 
 
 @kernel
@@ -338,7 +338,7 @@ def _meet_line(face, low, high):
     d = face.direction
     # Where the ray is nearest to the line. Of a ray along the side every place is as near as another.
     across = cross_pairs(as_pairs(d), face.along)
-    square = larger(dot(heads(across), heads(across)), np.finfo(np.float64).tiny)
+    square = maximum(dot(heads(across), heads(across)), np.finfo(np.float64).tiny)
     on_line = dot_pairs(cross_pairs(face.first, face.along), across)[0] / square
     # Where that is beyond an end of the side, or out of the box, the nearest there counts.
     nearest = _place(face, on_line)

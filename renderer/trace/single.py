@@ -3,7 +3,7 @@
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import LOCAL_WORDS, at, get, is_negative, local_words, pointer, put
+from renderer.numerics.simd import LOCAL_WORDS, is_negative, load, local_words, offset, pointer, store
 from renderer.trace.best import NO_FACE, Best, no_hit
 from renderer.trace.intersect import largest_of, make_shear
 from renderer.trace.leaf import nearest_carefully, tree_pointers
@@ -62,7 +62,7 @@ def write_best(tree, rays, found, i, best, slack, largest, dz, any_hit):
         best = count_from_start(tree, rays, i, best)
     write_hit(found, i, rays.scale, best, dz, any_hit)
     if slack > 0.0 and not any_hit and best.t == 0.0 and is_negative(best.t):
-        put(found.pile, i, np.int64(get(at(rays.starts.rows, i * rays.starts.step), PILE)))
+        store(found.pile, i, np.int64(load(offset(rays.starts.rows, i * rays.starts.step), PILE)))
 
 
 @kernel

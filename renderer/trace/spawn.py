@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import at, larger, pointer, put, smaller
+from renderer.numerics.simd import maximum, minimum, offset, pointer, store
 from renderer.numerics.vec3 import (
     add,
     barycentric,
@@ -166,7 +166,7 @@ def _clearance(side, double_area, reach):
     if not double_area / side > _THIN * side:
         return 2.0 * _LEAST * reach
     # In this order nothing overflows or vanishes before the result does: a hit triangle has reach^2 near its area.
-    return reach * larger(_LEAST, smaller(_GAMMA264 * (reach / double_area * reach), _MOST))
+    return reach * maximum(_LEAST, minimum(_GAMMA264 * (reach / double_area * reach), _MOST))
 
 
 @inlined
@@ -181,10 +181,10 @@ def offset_distance(p, p0, p1, p2, u, v, facet):
     w, distance, reach = 1.0 - u - v, 0.0, 0.0
     for k in range(3):
         distance += abs(n_g[k]) * (abs(w * p0[k]) + abs(u * p1[k]) + abs(v * p2[k]))
-        reach = larger(reach, largest_component((p0[k] - p[k], p1[k] - p[k], p2[k] - p[k])))
+        reach = maximum(reach, largest_component((p0[k] - p[k], p1[k] - p[k], p2[k] - p[k])))
     error = _GAMMA7 * distance + _clearance(side, double_area, reach)
     # A weight times the double area is the distance from its edge times the edge's length.
-    inside = smaller(u, smaller(v, w)) * double_area > _from_edges(p, side) * side
+    inside = minimum(u, minimum(v, w)) * double_area > _from_edges(p, side) * side
     inside = inside and double_area > side * LINE * side and error <= _FARTHEST_MOVE * side
     # rule: slack-on-edges
     return error, slack_of(p, error) if inside else EDGE
@@ -235,15 +235,15 @@ def put_start(row, place, n_g, w, d, offset):
     side = 1.0 if slope >= 0.0 else -1.0
     code = KNOWN | BARYCENTRIC | (ABOVE if side > 0.0 else 0) | (THROUGH if side != place.came else BACK)
     slack = place.slack if abs(slope) > LEVEL * largest_component(w) else EDGE
-    put(row, SLACK, slack if offset.uses_error_bound else 0.0)
-    put(row, FACE, place.face if offset.uses_error_bound else -1.0)
-    put(row, CODE, np.float64(code))
-    put(row, ANCHOR, place.u)
-    put(row, ANCHOR + 1, place.v)
+    store(row, SLACK, slack if offset.uses_error_bound else 0.0)
+    store(row, FACE, place.face if offset.uses_error_bound else -1.0)
+    store(row, CODE, np.float64(code))
+    store(row, ANCHOR, place.u)
+    store(row, ANCHOR + 1, place.v)
     # Of faces that coincide those from the first one on are passed: pictures cross all at once.
-    put(row, PILE, 0.0)
+    store(row, PILE, 0.0)
     for k in range(3):
-        put(row, WAY + k, -d[k])
+        store(row, WAY + k, -d[k])
 
 
 @kernel
@@ -255,8 +255,8 @@ def start_row(row, place, n_g, w, d):
 @inlined
 def put_no_start(row):
     """Write the row of ``starts.record`` for a ray that starts on no surface."""
-    put(row, SLACK, 0.0)
-    put(row, FACE, -1.0)
+    store(row, SLACK, 0.0)
+    store(row, FACE, -1.0)
 
 
 class _Plane(NamedTuple):
@@ -283,10 +283,10 @@ def _plane_near(p0, p1, p2, o):
     share = reach / area * reach
     # The bound of ``_clearance``, a 1024th more because the next test measures from where the point is moved to, and
     # that of the height below.
-    needed = reach * (larger(_LEAST, smaller(_GAMMA264 * share, _MOST)) * (1.0 + 2.0**-10) + _GAMMA336 * share)
+    needed = reach * (maximum(_LEAST, minimum(_GAMMA264 * share, _MOST)) * (1.0 + 2.0**-10) + _GAMMA336 * share)
     u, v = dot(cross(q, other), n), dot(cross(one, q), n)
     # A weight is the distance from its edge times the edge's length times the double area.
-    least = smaller(u, smaller(v, whole - u - v))
+    least = minimum(u, minimum(v, whole - u - v))
     # rule: start-inside-face
     inside = least > _from_edges(o, side) * side * area and needed <= _FARTHEST_MOVE * side
     n_g = scale(n, 1.0 / area)
@@ -352,7 +352,7 @@ def _lies_far(corners, o, unit):
     """Whether a point is farther from a face than points that went through float32 are."""
     p0, p1, p2 = corners
     o = scale(o, unit)
-    most = larger(largest_component(o), largest_of_three(p0, p1, p2))
+    most = maximum(largest_component(o), largest_of_three(p0, p1, p2))
     return far_from(anchor_of(Start(corners, o, 0, 0)), o) > FARTHEST_START * most
 
 
@@ -405,9 +405,9 @@ def offset_from_faces(vertices, faces, origins, directions, leaving, starts, row
             if slack == EDGE and bits & KNOWN == 0:
                 given = anchor if bits & BARYCENTRIC != 0 else scale(o, unit)
                 own, slack = _at_corner(Start(around, given, face, bits), o, unit)
-        row = at(pointer(starts), 3 * i)
+        row = offset(pointer(starts), 3 * i)
         for k in range(3):
-            put(row, k, own[k])
+            store(row, k, own[k])
             rows[i, ANCHOR + k] = anchor[k]
         rows[i, SLACK], rows[i, FACE], rows[i, CODE] = slack, np.float64(face), np.float64(bits)
     return -1

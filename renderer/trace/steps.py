@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import at, get, lowest_bit, pointer, put, store
+from renderer.numerics.simd import load, lowest_bit, offset, pointer, store
 from renderer.results.steps import Steps
 from renderer.system.threads import for_chunks
 from renderer.trace.batch import CHUNK, RayBatch, reject
@@ -58,7 +58,7 @@ def _count_chunk(descriptor, rays, counts, stack, near, begin, end):
     tree, source = tree_pointers(descriptor), ray_pointers(rays, tree_pointers(descriptor).scale)
     bad, work = first_bad_ray(source, begin, end), np.int64(0)
     if bad < 0 and tree.has_nodes:
-        waiting = _Waiting(pointer(stack), pointer(near), at(pointer(near), len(stack)))
+        waiting = _Waiting(pointer(stack), pointer(near), offset(pointer(near), len(stack)))
         for i in range(begin, end):
             ray, t_max = ray_at(source, i)
             counts[0, i], counts[1, i] = _count(tree, ray, t_max, waiting)
@@ -94,7 +94,7 @@ class TraversalCounts(NamedTuple):
 @kernel
 def _count(tree, ray, t_max, waiting):
     """Nodes and triangles of one ray."""
-    put(waiting.near, 0, np.float32(0.0))
+    store(waiting.near, 0, np.float32(0.0))
     nothing = TraversalCounts(no_hit(t_max), np.int64(0), np.int64(0))
     query = _Query(prepare_single(ray), waiting)
     found = walk_nearest_first(tree, waiting.stack, query, nothing, _reaches, _enter, _visit)
@@ -104,7 +104,7 @@ def _count(tree, ray, t_max, waiting):
 @inlined
 def _reaches(query, k, found):
     # Nothing is beyond a limit of NaN.
-    return not get(query.waiting.near, k) > box_limit(found.best.t, query.single.largest)
+    return not load(query.waiting.near, k) > box_limit(found.best.t, query.single.largest)
 
 
 @inlined
@@ -125,7 +125,7 @@ def _visit(tree, query, first, count, found):
 def _faces_in(tree, first, count):
     faces = np.int64(0)
     for place in range(first * BLOCK_FACES, (first + count) * BLOCK_FACES):
-        faces += np.int64(get(tree.faces, place) >= 0)
+        faces += np.int64(load(tree.faces, place) >= 0)
     return faces
 
 
@@ -136,13 +136,13 @@ def _push_sorted(tree, node, bits, waiting, top):
     while bits != 0:
         i = lowest_bit(bits)
         bits &= bits - 1
-        distance, child, k = get(waiting.distances, i), child_in(tree, node, i), top
-        while k > first and _precedes(get(near, k - 1), get(stack, k - 1), distance, child):
-            put(near, k, get(near, k - 1))
-            put(stack, k, get(stack, k - 1))
+        distance, child, k = load(waiting.distances, i), child_in(tree, node, i), top
+        while k > first and _precedes(load(near, k - 1), load(stack, k - 1), distance, child):
+            store(near, k, load(near, k - 1))
+            store(stack, k, load(stack, k - 1))
             k -= 1
-        put(near, k, distance)
-        put(stack, k, child)
+        store(near, k, distance)
+        store(stack, k, child)
         top += 1
     return top
 

@@ -11,15 +11,14 @@ import numpy as np
 
 from renderer.jit.decorators import inlined
 from renderer.numerics.simd import (
-    at,
     count_bits,
     farthest_first,
-    get,
+    load,
     lowest_bit,
+    minimum,
     movemask,
+    offset,
     prefetch,
-    put,
-    smaller,
     splat4,
     splat8,
     store,
@@ -123,15 +122,15 @@ LANE_INTEGERS, LANE_DOUBLES = 5 * _LANES + HALF_GROUPS + 1, 4 * BLOCK_FACES * _L
 def make_lanes(integers, doubles, stack_size):
     """Lanes in the given memory; the stacks, ``stack_size`` entries each, follow the LANE_INTEGERS other words."""
     return Lanes(
-        at(integers, LANE_INTEGERS), stack_size, integers, at(integers, _LANES), at(integers, 2 * _LANES),
-        at(integers, 3 * _LANES), at(integers, 4 * _LANES), doubles, at(integers, 5 * _LANES),
+        offset(integers, LANE_INTEGERS), stack_size, integers, offset(integers, _LANES), offset(integers, 2 * _LANES),
+        offset(integers, 3 * _LANES), offset(integers, 4 * _LANES), doubles, offset(integers, 5 * _LANES),
     )  # fmt: skip
 
 
 @inlined
 def clear_lanes(lanes):
     """Let all lanes be free."""
-    put(lanes.left, HALF_GROUPS, (1 << HALF_GROUPS) - 1)
+    store(lanes.left, HALF_GROUPS, (1 << HALF_GROUPS) - 1)
 
 
 @inlined
@@ -141,16 +140,16 @@ def begin_rays(rays, prepared, lanes, queue, counts):
     Returns the first ray that still waits, and the ``LaneCounts``.
     """
     following, nodes = queue.following, counts.nodes
-    while following < queue.count and nodes + counts.leaves <= MIN_ACTIVE and get(lanes.left, HALF_GROUPS) != 0:
-        free = get(lanes.left, HALF_GROUPS)
+    while following < queue.count and nodes + counts.leaves <= MIN_ACTIVE and load(lanes.left, HALF_GROUPS) != 0:
+        free = load(lanes.left, HALF_GROUPS)
         half = lowest_bit(free)
-        put(lanes.left, HALF_GROUPS, free & (free - 1))
-        some, r = smaller(queue.count - following, 8), lane_of(half >> 1, 8 * (half & 1))
-        prepare_eight(rays, prepared, r, at(queue.numbers, following))
-        put(lanes.left, half, some)
+        store(lanes.left, HALF_GROUPS, free & (free - 1))
+        some, r = minimum(queue.count - following, 8), lane_of(half >> 1, 8 * (half & 1))
+        prepare_eight(rays, prepared, r, offset(queue.numbers, following))
+        store(lanes.left, half, some)
         for k in range(some):
-            begin_ray(prepared, lanes, r + k, get(queue.numbers, following + k))
-            put(lanes.at_node, nodes + k, r + k)
+            begin_ray(prepared, lanes, r + k, load(queue.numbers, following + k))
+            store(lanes.at_node, nodes + k, r + k)
         following, nodes = following + some, nodes + some
     return following, LaneCounts(nodes, counts.leaves, counts.ends)
 
@@ -159,11 +158,11 @@ def begin_rays(rays, prepared, lanes, queue, counts):
 def begin_ray(prepared, lanes, r, number):
     """Let the prepared ray in lane ``r`` start at the root."""
     integers, bottom = prepared.integers, stack_of(lanes, r)
-    put(integers, CHILD + r, 0)
-    put(integers, TOP + r, bottom + 1)
-    put(integers, NUMBER + r, number)
-    put(integers, UNRESOLVED + r, 0)
-    put(lanes.stacks, bottom, _BOTTOM)
+    store(integers, CHILD + r, 0)
+    store(integers, TOP + r, bottom + 1)
+    store(integers, NUMBER + r, number)
+    store(integers, UNRESOLVED + r, 0)
+    store(lanes.stacks, bottom, _BOTTOM)
 
 
 @inlined
@@ -176,17 +175,17 @@ def stack_of(lanes, r):
 def end_ray(lanes, r):
     """Count a ray as ended; its eight lanes are free when it is the last of them."""
     half = lane_index(r) // 8
-    left = get(lanes.left, half) - 1
-    put(lanes.left, half, left)
-    put(lanes.left, HALF_GROUPS, get(lanes.left, HALF_GROUPS) | (np.int64(left == 0) << half))
+    left = load(lanes.left, half) - 1
+    store(lanes.left, half, left)
+    store(lanes.left, HALF_GROUPS, load(lanes.left, HALF_GROUPS) | (np.int64(left == 0) << half))
 
 
 @inlined
 def wait_octant(prepared, lanes, r, entry, child):
     """Push an octant onto the stack of ray ``r``: the distance of ``entry``, and its child."""
-    top = get(prepared.integers, TOP + r)
-    put(lanes.stacks, top, with_child(entry, child))
-    put(prepared.integers, TOP + r, top + 1)
+    top = load(prepared.integers, TOP + r)
+    store(lanes.stacks, top, with_child(entry, child))
+    store(prepared.integers, TOP + r, top + 1)
 
 
 @inlined
@@ -196,26 +195,26 @@ def meet_nodes(tree, rays, lanes, count):
     It takes no branch: all eight are sorted and written, and the top moves by those that are met.
     """
     for k in range(count):
-        r = get(lanes.at_node, k)
-        node, top = get(rays.integers, CHILD + r), get(rays.integers, TOP + r)
-        lower, upper = splat8(get(rays.floats, LOWER + r)), splat8(get(rays.floats, LIMIT + r))
+        r = load(lanes.at_node, k)
+        node, top = load(rays.integers, CHILD + r), load(rays.integers, TOP + r)
+        lower, upper = splat8(load(rays.floats, LOWER + r)), splat8(load(rays.floats, LIMIT + r))
         t0, meets = meet_boxes(tree.nodes, node, slabs_of(rays, r), lower, upper)
         store(lanes.stacks, top, farthest_first(meets, t0, tree.links, node * NODE_WORDS + CHILDREN))
-        put(rays.integers, TOP + r, top + count_bits(movemask(meets)))
+        store(rays.integers, TOP + r, top + count_bits(movemask(meets)))
 
 
 @inlined
 def resume(tree, rays, lanes, r):
     """Take the next child of ray ``r`` that is not beyond its best hit off its stack, and return it."""
     # rule: resume-limit
-    limit, top = get(rays.floats, LIMIT + r), get(rays.integers, TOP + r) - 1
-    entry = get(lanes.stacks, top)
+    limit, top = load(rays.floats, LIMIT + r), load(rays.integers, TOP + r) - 1
+    entry = load(lanes.stacks, top)
     while distance_of(entry) > limit:
         top -= 1
-        entry = get(lanes.stacks, top)
+        entry = load(lanes.stacks, top)
     child = child_of_entry(entry)
-    put(rays.integers, CHILD + r, child)
-    put(rays.integers, TOP + r, top)
+    store(rays.integers, CHILD + r, child)
+    store(rays.integers, TOP + r, top)
     _prefetch_child(tree, child)
     return child
 
@@ -224,14 +223,14 @@ def resume(tree, rays, lanes, r):
 def meet_leaves(tree, rays, lanes, count):
     """Compute what each of ``count`` rays hits in the first block of its leaf."""
     for k in range(count):
-        r = get(lanes.at_leaf, k)
-        base, shear = first_block(get(rays.integers, CHILD + r)) * BLOCK_WORDS, shear_of(rays, r)
+        r = load(lanes.at_leaf, k)
+        base, shear = first_block(load(rays.integers, CHILD + r)) * BLOCK_WORDS, shear_of(rays, r)
         edges, seen = see_triangles(tree, base, shear)
-        t_min, t_max = get(rays.doubles, T_MIN + r), get(rays.doubles, T + r)
+        t_min, t_max = load(rays.doubles, T_MIN + r), load(rays.doubles, T + r)
         planes = meet_planes(tree, base, edges, seen, shear, t_min, t_max)
         within = movemask((planes.t >= splat4(t_min)) & (planes.t <= splat4(t_max)))
-        put(lanes.bits, k, seen & ~planes.uncertain & within)
-        put(lanes.must_resolve, k, planes.must_resolve)
+        store(lanes.bits, k, seen & ~planes.uncertain & within)
+        store(lanes.must_resolve, k, planes.must_resolve)
         hits = 4 * BLOCK_FACES * k
         store(lanes.hits, hits, planes.t)
         store(lanes.hits, hits + BLOCK_FACES, edges.e1)
@@ -245,34 +244,34 @@ def take_hits(tree, rays, lanes, k):
 
     Returns whether there is a hit.
     """
-    r, bits, hits = get(lanes.at_leaf, k), get(lanes.bits, k), at(lanes.hits, 4 * BLOCK_FACES * k)
-    put(rays.integers, UNRESOLVED + r, get(rays.integers, UNRESOLVED + r) | get(lanes.must_resolve, k))
+    r, bits, hits = load(lanes.at_leaf, k), load(lanes.bits, k), offset(lanes.hits, 4 * BLOCK_FACES * k)
+    store(rays.integers, UNRESOLVED + r, load(rays.integers, UNRESOLVED + r) | load(lanes.must_resolve, k))
     if bits == 0:
         return False
-    block, best = first_block(get(rays.integers, CHILD + r)), best_of(rays, r)
+    block, best = first_block(load(rays.integers, CHILD + r)), best_of(rays, r)
     t, face, u, v, w = best.t, best.face, best.u, best.v, best.w
     while bits != 0:
         i = lowest_bit(bits)
         bits &= bits - 1
-        ti, fi = get(hits, i), get(tree.faces, block * BLOCK_FACES + i)
+        ti, fi = load(hits, i), load(tree.faces, block * BLOCK_FACES + i)
         # rule: tie-in-streams
         if ti < t or (ti == t and fi < face):
             t, face = ti, fi
-            u, v, w = get(hits, BLOCK_FACES + i), get(hits, 2 * BLOCK_FACES + i), get(hits, 3 * BLOCK_FACES + i)
+            u, v, w = load(hits, BLOCK_FACES + i), load(hits, 2 * BLOCK_FACES + i), load(hits, 3 * BLOCK_FACES + i)
     put_best(rays, r, Best(t, face, u, v, w))
-    put(rays.floats, LIMIT + r, box_limit(t, get(rays.doubles, LARGEST + r)))
+    store(rays.floats, LIMIT + r, box_limit(t, load(rays.doubles, LARGEST + r)))
     return True
 
 
 @inlined
 def leave_leaf(tree, rays, lanes, r):
     """Choose the next child of ray ``r`` at a leaf: the rest of its blocks, else one off its stack. Returns it."""
-    child = get(rays.integers, CHILD + r)
+    child = load(rays.integers, CHILD + r)
     # rule: rest-of-leaf
     if ~child & (MAX_LEAF_BLOCKS - 1) != 0:
         # The first block is one further on, and the number of blocks one less.
         child -= MAX_LEAF_BLOCKS - 1
-        put(rays.integers, CHILD + r, child)
+        store(rays.integers, CHILD + r, child)
         return child
     return resume(tree, rays, lanes, r)
 
@@ -284,9 +283,9 @@ def list_lane(lanes, r, child, counts):
     It takes no branch: the lane is written to all three.
     """
     nodes, leaves, ends = counts.nodes, counts.leaves, counts.ends
-    put(lanes.at_node, nodes, r)
-    put(lanes.at_leaf, leaves, r)
-    put(lanes.at_end, ends, r)
+    store(lanes.at_node, nodes, r)
+    store(lanes.at_leaf, leaves, r)
+    store(lanes.at_end, ends, r)
     at_node, at_end = np.int64(child >= 0), np.int64(child == END)
     return LaneCounts(nodes + at_node, leaves + (1 - at_node - at_end), ends + at_end)
 
@@ -314,16 +313,16 @@ def run_lanes(tree, rays, prepared, lanes, counts, queue, most_rounds, query, me
         entered, counts = counts.nodes, LaneCounts(np.int64(0), counts.leaves, counts.ends)
         meet_nodes(tree, prepared, lanes, entered)
         for k in range(entered):
-            r = get(lanes.at_node, k)
+            r = load(lanes.at_node, k)
             counts = list_lane(lanes, r, resume(tree, prepared, lanes, r), counts)
         # Take the rays at leaves one block on.
         entered, counts = counts.leaves, LaneCounts(counts.nodes, np.int64(0), counts.ends)
         meet(tree, query, lanes, entered)
         for k in range(entered):
-            r, ends = get(lanes.at_leaf, k), take(tree, query, k)
+            r, ends = load(lanes.at_leaf, k), take(tree, query, k)
             counts = list_lane(lanes, r, END if ends else leave_leaf(tree, prepared, lanes, r), counts)
         for k in range(counts.ends):
-            r = get(lanes.at_end, k)
+            r = load(lanes.at_end, k)
             rounds += finish(tree, query, r)
             end_ray(lanes, r)
         counts = LaneCounts(counts.nodes, counts.leaves, np.int64(0))

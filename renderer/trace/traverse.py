@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import at, get, lowest_bit, pointer, put, smaller
+from renderer.numerics.simd import load, lowest_bit, minimum, offset, pointer, store
 from renderer.trace.best import NO_FACE, no_hit
 from renderer.trace.intersect import largest_of, make_shear
 from renderer.trace.layout import cache_aligned
@@ -97,11 +97,11 @@ def new_scratch(depth: int, rays: int) -> Scratch:
 def scratch_pointers(scratch):
     """The ``ScratchPointers`` into a ``Scratch``."""
     floats, doubles, integers = pointer(scratch.floats), pointer(scratch.doubles), pointer(scratch.integers)
-    size, lane_integers = scratch.stack_size, at(integers, GROUPS * GROUP_STRIDE)
-    lanes = make_lanes(lane_integers, at(doubles, GROUPS * GROUP_STRIDE), size)
-    packet_stack = at(lane_integers, LANE_INTEGERS + GROUPS * WIDTH * size)
+    size, lane_integers = scratch.stack_size, offset(integers, GROUPS * GROUP_STRIDE)
+    lanes = make_lanes(lane_integers, offset(doubles, GROUPS * GROUP_STRIDE), size)
+    packet_stack = offset(lane_integers, LANE_INTEGERS + GROUPS * WIDTH * size)
     return ScratchPointers(
-        Prepared(floats, doubles, integers), lanes, packet_stack, at(packet_stack, size), pointer(scratch.holders)
+        Prepared(floats, doubles, integers), lanes, packet_stack, offset(packet_stack, size), pointer(scratch.holders)
     )
 
 
@@ -118,21 +118,21 @@ class Progress(NamedTuple):
 @kernel
 def are_coherent(rays, begin):
     """Whether the sixteen rays from ``begin`` on share their dominant axis, its sign and nearly their slopes."""
-    d, step = at(rays.directions, begin * rays.direction_step), rays.direction_step
-    ax, ay, az = abs(get(d, 0)), abs(get(d, 1)), abs(get(d, 2))
+    d, step = offset(rays.directions, begin * rays.direction_step), rays.direction_step
+    ax, ay, az = abs(load(d, 0)), abs(load(d, 1)), abs(load(d, 2))
     w = 2 if az >= ax and az >= ay else (1 if ay >= ax else 0)
     u, v = (w + 1) % 3, (w + 2) % 3
-    first = get(d, w)
-    slope_u, slope_v = get(d, u) / first, get(d, v) / first
+    first = load(d, w)
+    slope_u, slope_v = load(d, u) / first, load(d, v) / first
     for r in range(1, WIDTH):
-        dw, du, dv = get(d, step * r + w), get(d, step * r + u), get(d, step * r + v)
+        dw, du, dv = load(d, step * r + w), load(d, step * r + u), load(d, step * r + v)
         size = abs(dw)
         # Strictly larger: between equal components the choice of ``make_shear`` depends on which they are.
         dominant = size > abs(du) and size > abs(dv) and dw * first > 0.0
         if not (dominant and abs(du - slope_u * dw) <= _SPREAD * size and abs(dv - slope_v * dw) <= _SPREAD * size):
             return False
     size = abs(first)
-    return size > abs(get(d, u)) and size > abs(get(d, v))
+    return size > abs(load(d, u)) and size > abs(load(d, v))
 
 
 class _Query(NamedTuple):
@@ -152,13 +152,13 @@ def _finish(tree, query, r):
     """
     rays, scratch, prepared = query.rays, query.scratch, query.scratch.prepared
     best, steps = best_of(prepared, r), np.int64(0)
-    i, slack = get(prepared.integers, NUMBER + r), get(prepared.doubles, SLACK + r)
+    i, slack = load(prepared.integers, NUMBER + r), load(prepared.doubles, SLACK + r)
     # rule: resolve-uncertain
-    if get(prepared.integers, UNRESOLVED + r) != 0 or slack == EDGE:
-        stack = at(scratch.lanes.stacks, stack_of(scratch.lanes, r))
+    if load(prepared.integers, UNRESOLVED + r) != 0 or slack == EDGE:
+        stack = offset(scratch.lanes.stacks, stack_of(scratch.lanes, r))
         careful = search_carefully(tree, rays, i, stack, scratch.holders, query.any_hit)
         best, steps = careful.best, careful.steps
-    largest, dz = get(prepared.doubles, LARGEST + r), get(prepared.doubles, DIRECTION_Z + r)
+    largest, dz = load(prepared.doubles, LARGEST + r), load(prepared.doubles, DIRECTION_Z + r)
     write_best(tree, rays, query.found, i, best, slack, largest, dz, query.any_hit)
     return steps // MIN_ACTIVE
 
@@ -197,7 +197,7 @@ def _trace_stream(tree, query, following, count):
     scratch = query.scratch
     clear_lanes(scratch.lanes)
     for k in range(count, count + WIDTH):
-        put(scratch.waiting, k, get(scratch.waiting, count - 1))
+        store(scratch.waiting, k, load(scratch.waiting, count - 1))
     return _run(tree, query, _no_lanes(), Queue(scratch.waiting, following, count))[0]
 
 
@@ -209,10 +209,10 @@ def _hand_over(tree, query, top, unresolved):
     """
     scratch, prepared, lanes = query.scratch, query.scratch.prepared, query.scratch.lanes
     for r in range(WIDTH):
-        begin_ray(prepared, lanes, r, get(prepared.integers, NUMBER + r))
-        put(prepared.integers, UNRESOLVED + r, (unresolved >> r) & 1)
+        begin_ray(prepared, lanes, r, load(prepared.integers, NUMBER + r))
+        store(prepared.integers, UNRESOLVED + r, (unresolved >> r) & 1)
     for k in range(top):
-        entry = get(scratch.packet_stack, k)
+        entry = load(scratch.packet_stack, k)
         child, at_ = child_of(tree, octant_of(entry))
         meeting = meet_octant(tree, prepared, at_)
         while meeting != 0:
@@ -221,7 +221,7 @@ def _hand_over(tree, query, top, unresolved):
     counts = _no_lanes()
     for r in range(WIDTH):
         if query.any_hit and best_of(prepared, r).face != NO_FACE:
-            put(prepared.integers, UNRESOLVED + r, 0)
+            store(prepared.integers, UNRESOLVED + r, 0)
             _finish(tree, query, r)
         else:
             counts = list_lane(lanes, r, resume(tree, prepared, lanes, r), counts)
@@ -232,16 +232,16 @@ def _hand_over(tree, query, top, unresolved):
 def _trace_sixteen(tree, query, first):
     """Trace the rays from ``first`` on as a packet, and as lanes from where it gave up; returns the rounds of lanes."""
     prepared, rounds = query.scratch.prepared, np.int64(0)
-    numbers = at(prepared.integers, NUMBER)
+    numbers = offset(prepared.integers, NUMBER)
     for r in range(WIDTH):
-        put(numbers, r, first + r)
+        store(numbers, r, first + r)
     for half in range(0, WIDTH, 8):
-        prepare_eight(query.rays, prepared, half, at(numbers, half))
+        prepare_eight(query.rays, prepared, half, offset(numbers, half))
     top, unresolved = trace_packet(tree, prepared, query.scratch.packet_stack, query.any_hit)
     if top > 0:
         return _hand_over(tree, query, top, unresolved)
     for r in range(WIDTH):
-        put(prepared.integers, UNRESOLVED + r, (unresolved >> r) & 1)
+        store(prepared.integers, UNRESOLVED + r, (unresolved >> r) & 1)
         rounds += _finish(tree, query, r)
     return rounds
 
@@ -284,8 +284,8 @@ def _trace_on(tree, query, progress, end):
             if rounds > _WORK:
                 return Progress(first + WIDTH, following, count)
             continue
-        for i in range(first, smaller(first + WIDTH, end)):
-            put(waiting, count, i)
+        for i in range(first, minimum(first + WIDTH, end)):
+            store(waiting, count, i)
             count += 1
     if following < count:
         following = _trace_stream(tree, query, following, count)

@@ -7,7 +7,7 @@ inlines both, so a walk costs what a loop of its own would.
 import numpy as np
 
 from renderer.jit.decorators import inlined
-from renderer.numerics.simd import get, lowest_bit, put
+from renderer.numerics.simd import load, lowest_bit, store
 from renderer.trace.layout import CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS
 
 
@@ -31,14 +31,14 @@ def first_block(leaf):
 @inlined
 def child_in(tree, node, octant):
     """The node or leaf in an octant of a node."""
-    return np.int64(get(tree.links, node * NODE_WORDS + CHILDREN + octant))
+    return np.int64(load(tree.links, node * NODE_WORDS + CHILDREN + octant))
 
 
 @inlined
 def push_children(tree, node, bits, stack, top):
     """Let the children in the octants ``bits`` of a node wait on a stack, the last on top; returns the new top."""
     while bits != 0:
-        put(stack, top, child_in(tree, node, lowest_bit(bits)))
+        store(stack, top, child_in(tree, node, lowest_bit(bits)))
         bits &= bits - 1
         top += 1
     return top
@@ -61,10 +61,10 @@ def walk(tree, stack, query, found, enter, visit):
         found, _ = visit(tree, query, 0, tree.count, found)
         return found
     top, ends = 1, False
-    put(stack, 0, 0)
+    store(stack, 0, 0)
     while top > 0 and not ends:
         top -= 1
-        child = get(stack, top)
+        child = load(stack, top)
         if child < 0:
             first, count = blocks_of(child)
             found, ends = visit(tree, query, first, count, found)
@@ -86,12 +86,12 @@ def walk_nearest_first(tree, stack, query, found, reaches, enter, visit):
         found, _ = visit(tree, query, 0, tree.count, found)
         return found
     top, ends = 1, False
-    put(stack, 0, 0)
+    store(stack, 0, 0)
     while top > 0 and not ends:
         top -= 1
         if not reaches(query, top, found):
             continue
-        child = get(stack, top)
+        child = load(stack, top)
         if child < 0:
             first, count = blocks_of(child)
             found, ends = visit(tree, query, first, count, found)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.jit.decorators import kernel
-from renderer.numerics.simd import float32_pointer, float64_pointer, put
+from renderer.numerics.simd import float32_pointer, float64_pointer, store
 from renderer.system.threads import for_chunks
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, cache_aligned, locked
 
@@ -29,9 +29,9 @@ def _fill(vertices, faces, block_faces, address, wide, begin, end):
                 at = base + BLOCK_FACES * (3 * corner + axis)
                 x = vertices[faces[face, corner], axis] if face >= 0 else np.nan
                 if wide:
-                    put(doubles, at, x)
+                    store(doubles, at, x)
                 else:
-                    put(floats, at, np.float32(x))
+                    store(floats, at, np.float32(x))
 
 
 def fill_blocks(

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import larger
+from renderer.numerics.simd import maximum
 from renderer.trace.layout import BLOCK_FACES, CHILDREN, LEAF_BITS, NODE_WORDS, UNUSED
 from renderer.tree.bounds import BOX, FACE
 
@@ -41,7 +41,7 @@ def emit_nodes(tree, numbers, ends, nodes, links, block_faces, scratch):
         # Make the node and hang it below its parent.
         top -= 1
         part, level, parent = np.int64(waiting[top, 0]), np.int64(waiting[top, 1]), waiting[top, 2]
-        depth = larger(depth, level)
+        depth = maximum(depth, level)
         base = used * NODE_WORDS
         _clear_node(nodes, links, base)
         if parent >= 0:
@@ -58,7 +58,7 @@ def emit_nodes(tree, numbers, ends, nodes, links, block_faces, scratch):
                 top = _wait(waiting, top, child, level + 1, link)
             elif len(ends) > 0:
                 links[link] = ends[child, 0]
-                depth = larger(depth, level + ends[child, 1])
+                depth = maximum(depth, level + ends[child, 1])
             else:
                 links[link] = leaf_link(blocks, tree.ranges[child, 1] - tree.ranges[child, 0])
                 blocks = emit_leaf(tree, child, numbers, block_faces, blocks)

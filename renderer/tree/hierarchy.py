@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.jit.decorators import kernel
-from renderer.numerics.simd import smaller
+from renderer.numerics.simd import minimum
 from renderer.trace.layout import BLOCK_FACES
 from renderer.tree.bounds import BOX
 
@@ -66,4 +66,4 @@ def add_part(tree, part, begin, end):
 @kernel
 def whole_size(rule):
     """The most faces of a part that is never cut, because they fit into one block."""
-    return smaller(rule.leaf_size, BLOCK_FACES)
+    return minimum(rule.leaf_size, BLOCK_FACES)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import larger, load8, smaller, store
+from renderer.numerics.simd import load8, maximum, minimum, store
 from renderer.tree.bounds import BOX, double_centre, empty_box, fit, united
 from renderer.tree.hierarchy import add_part
 
@@ -115,7 +115,7 @@ def _centres_middle_along(boxes, begin, end, axis):
     low, high = np.float32(np.inf), np.float32(-np.inf)
     for i in range(begin, end):
         centre = double_centre(boxes, i * BOX, axis)
-        low, high = smaller(low, centre), larger(high, centre)
+        low, high = minimum(low, centre), maximum(high, centre)
     return low + (high - low) * np.float32(0.5)
 
 

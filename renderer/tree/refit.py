@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.jit.decorators import kernel
-from renderer.numerics.simd import larger, smaller
+from renderer.numerics.simd import maximum, minimum
 from renderer.system.threads import for_chunks
 from renderer.trace.intersect import face_range
 from renderer.trace.layout import (
@@ -45,7 +45,7 @@ def _fit_leaf(vertices, faces, block_faces, first, last, nodes, at):
             if face >= 0:
                 a, b, c = faces[face]
                 bottom, top = face_range(vertices[a, axis], vertices[b, axis], vertices[c, axis])
-                low, high = smaller(low, bottom), larger(high, top)
+                low, high = minimum(low, bottom), maximum(high, top)
         nodes[at + 16 * axis], nodes[at + 16 * axis + 8] = low, high
 
 
@@ -60,7 +60,7 @@ def _fit_nodes(nodes, links):
                     row, at = child * NODE_WORDS + 16 * axis, node * NODE_WORDS + 16 * axis + place
                     low, high = nodes[row], nodes[row + 8]
                     for k in range(1, 8):
-                        low, high = smaller(low, nodes[row + k]), larger(high, nodes[row + 8 + k])
+                        low, high = minimum(low, nodes[row + k]), maximum(high, nodes[row + 8 + k])
                     nodes[at], nodes[at + 8] = low, high
 
 

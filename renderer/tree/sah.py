@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import larger, load8, smaller, store
+from renderer.numerics.simd import load8, maximum, minimum, store
 from renderer.trace.layout import BLOCK_FACES
 from renderer.tree.bounds import BOX, double_centre, empty_box, fit, half_area, united
 from renderer.tree.hierarchy import add_part
@@ -71,8 +71,8 @@ def _spread_bins(boxes, begin, end, count):
     for i in range(begin, end):
         base = i * BOX
         x, y, z = double_centre(boxes, base, 0), double_centre(boxes, base, 1), double_centre(boxes, base, 2)
-        x0, y0, z0 = smaller(x0, x), smaller(y0, y), smaller(z0, z)
-        x1, y1, z1 = larger(x1, x), larger(y1, y), larger(z1, z)
+        x0, y0, z0 = minimum(x0, x), minimum(y0, y), minimum(z0, z)
+        x1, y1, z1 = maximum(x1, x), maximum(y1, y), maximum(z1, z)
     return Bins((x0, y0, z0), (_scale(x1 - x0, count), _scale(y1 - y0, count), _scale(z1 - z0, count)), count)
 
 
@@ -83,7 +83,7 @@ def _scale(extent, count):
 
 @inlined
 def _bin(centre, bins, axis):
-    return smaller(bins.count - 1, larger(0, np.int64((centre - bins.low[axis]) * bins.scale[axis])))
+    return minimum(bins.count - 1, maximum(0, np.int64((centre - bins.low[axis]) * bins.scale[axis])))
 
 
 @kernel

@@ -73,9 +73,9 @@ def assert_arrays(expected: Expected) -> None:
 
 @pytest.mark.judges(
     "AllHits", "AllHits.counts", "AllHits.normals", "AllHits.points", "AllHits.ray", "ClosestPoints",
-    "ClosestPoints.found", "ClosestPoints.points", "Hits", "Hits.hit", "Hits.normals", "Hits.points", "Octree.any_hit",
-    "Octree.contains", "Octree.count_hits", "Octree.signed_distance", "Octree.visible", "Octree.winding_number",
-    "Steps",
+    "ClosestPoints.found", "ClosestPoints.points", "Hits", "Hits.hit", "Hits.normals", "Hits.points", "Hits.shaped",
+    "Octree.any_hit", "Octree.contains", "Octree.count_hits", "Octree.signed_distance", "Octree.visible",
+    "Octree.winding_number", "Steps",
 )  # fmt: skip
 @pytest.mark.parametrize("kind", [Octree, BruteForce])
 @pytest.mark.parametrize("shape", [(), (5,), (4, 15)])

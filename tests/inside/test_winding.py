@@ -16,7 +16,7 @@ from renderer.inside.moments import moments_of
 from renderer.inside.winding_search import _FIRST, _point_at, _Query, _search
 from renderer.jit.decorators import kernel
 from renderer.mesh.shapes import box, icosphere, lattice_faces, torus
-from renderer.numerics.simd import at, local_doubles, pointer
+from renderer.numerics.simd import local_doubles, offset, pointer
 from renderer.trace.leaf import tree_pointers
 from renderer.trace.walk import stack_size
 from validation.stability.cases.queries.inside import closed_solids, points_at, winding_numbers
@@ -253,7 +253,7 @@ def search_all(descriptor, rows, points, share, out, stack):
     """The winding number and its bound of each point, in the rows of ``out`` (n, 2)."""
     tree, rows, stack, parts = tree_pointers(descriptor), pointer(rows), pointer(stack), local_doubles()
     for i in range(len(points)):
-        point = _point_at(tree, at(pointer(points), 3 * i))
+        point = _point_at(tree, offset(pointer(points), 3 * i))
         out[i, 0], out[i, 1], _ = _search(tree, _Query(rows, point, share, parts), stack)
 
 

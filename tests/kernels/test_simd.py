@@ -6,29 +6,28 @@ from cases import cases
 from numba import njit
 
 from renderer.numerics.simd import (
-    alike,
     bits_float,
+    broadcast_like,
     double_of,
-    every8,
+    fabs,
     farthest_first,
     float32_pointer,
     float64_pointer,
     float_bits,
     gather8,
-    get,
     int32_pointer,
     is_negative,
-    larger,
+    load,
     load4,
     load8,
+    load_strided8,
     lowest_bit,
-    magnitude,
+    maximum,
+    minimum,
     movemask,
     narrow,
     pointer,
-    put,
     select,
-    smaller,
     splat4,
     splat8,
     square_root,
@@ -140,7 +139,7 @@ def test_bits():
 
 @njit
 def extremes_of(a, b):
-    return larger(a, b), smaller(a, b)
+    return maximum(a, b), minimum(a, b)
 
 
 @cases("kind", [np.float32, np.float64, np.int32, np.int64])
@@ -157,9 +156,9 @@ def test_larger_and_smaller_are_those_of_python(kind):
 @njit
 def through_addresses(floats, doubles, integers, bits):
     a, b, c = float32_pointer(floats), float64_pointer(doubles), int32_pointer(integers)
-    put(a, 1, get(a, 0) + np.float32(1.0))
-    put(b, 1, get(b, 0) + 1.0)
-    put(c, 1, get(c, 0) + np.int32(1))
+    store(a, 1, load(a, 0) + np.float32(1.0))
+    store(b, 1, load(b, 0) + 1.0)
+    store(c, 1, load(c, 0) + np.int32(1))
     return double_of(bits)
 
 
@@ -196,16 +195,16 @@ def test_octants_are_sorted_as_numpy_sorts_them(seed):
 @njit
 def eight_of(base, rows, step, out, ints):
     pointed = pointer(base)
-    x, y = gather8(pointed, pointer(rows), step, 1), every8(pointed, 2, step)
+    x, y = gather8(pointed, pointer(rows), step, 1), load_strided8(pointed, 2, step)
     store(out, 0, x)
     store(out, 8, y)
     store(out, 16, widen(narrow(x)))
     store(out, 24, select(is_negative(x), y, 0.5))
-    store(out, 32, larger(smaller(x, 1.0), -1.0) * 2.0 + magnitude(y))
-    store(out, 40, alike(7.0, x))
-    store(pointer(out), 48, alike(7.0, 1.0))
+    store(out, 32, maximum(minimum(x, 1.0), -1.0) * 2.0 + fabs(y))
+    store(out, 40, broadcast_like(7.0, x))
+    store(pointer(out), 48, broadcast_like(7.0, 1.0))
     store(ints, 0, select(x > 0.0, 3, 4))
-    store(ints, 8, alike(9, y))
+    store(ints, 8, broadcast_like(9, y))
 
 
 @pytest.mark.parametrize("step", [0, 3])
@@ -228,10 +227,10 @@ def with_numbers(a, c, out, masks):
     x = load8(a, 0)
     store(out, 0, x + c)
     store(out, 8, c - x)
-    store(out, 16, larger(x, c))
-    store(out, 24, larger(c, x))
-    store(out, 32, smaller(x, c))
-    store(out, 40, smaller(c, x))
+    store(out, 16, maximum(x, c))
+    store(out, 24, maximum(c, x))
+    store(out, 32, minimum(x, c))
+    store(out, 40, minimum(c, x))
     store(out, 48, select(x < c, c, x))
     masks[0], masks[1] = movemask(x < c), movemask(c <= x)
 
@@ -252,9 +251,9 @@ def test_a_number_beside_a_vector_stands_for_all_lanes():
 
 @njit
 def magnitudes(a8, a4, out8, out4, number):
-    store(out8, 0, magnitude(load8(a8, 0)))
-    store(out4, 0, magnitude(load4(a4, 0)))
-    return magnitude(number)
+    store(out8, 0, fabs(load8(a8, 0)))
+    store(out4, 0, fabs(load4(a4, 0)))
+    return fabs(number)
 
 
 def test_magnitudes_have_no_sign():

@@ -8,6 +8,7 @@ import pytest
 from cases import cases
 
 from renderer.errors import MeshError
+from renderer.mesh.shapes import icosphere
 from renderer.octree import BruteForce, Octree
 
 pytestmark = pytest.mark.judges("BruteForce", "Octree", "Octree.any_hit", "Octree.closest_hit", "Octree.from_mesh")
@@ -76,6 +77,15 @@ def test_what_is_unusual_but_right_is_taken(query: Any) -> None:
         query(GOOD, GOOD, low, high)
     query(GOOD * 2.0**126, -GOOD)
     query([[1, 2, 3]], np.array([[0, 0, 1]], np.uint8), [0.0], [1.0])
+
+
+@cases("accelerator", [Octree, BruteForce])
+@cases(("low", "high"), [(2.0, 1.0), (np.finfo(float).max, 0.0), (np.full(4, 9.0), np.full(4, 8.5))])
+def test_an_interval_without_numbers_holds_no_hit(accelerator: Any, low: Any, high: Any) -> None:
+    ball = accelerator.from_mesh(icosphere(1))
+    hits = ball.closest_hit(-9.0 * GOOD, GOOD, low, high)
+    assert ball.any_hit(-9.0 * GOOD, GOOD).all() and (hits.face == -1).all() and np.isinf(hits.t).all()
+    assert not ball.any_hit(-9.0 * GOOD, GOOD, low, high).any()
 
 
 def bad_options() -> Iterator[tuple[str, Any]]:

@@ -271,7 +271,7 @@ def test_a_newer_view_ends_a_proof_under_way(client: Client) -> None:
 
 
 def test_progress_of_a_proof_rises_to_one(client: Client) -> None:
-    client.view(mode="proof", w=500, h=400, settings={"pair": "samples"})
+    client.view(mode="proof", w=320, h=240, settings={"pair": "samples"})
     done, got = [], None
     while not (got and got.last):
         message = client.next()

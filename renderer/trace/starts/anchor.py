@@ -18,7 +18,7 @@ from renderer.numerics.double_double import (
     quotient,
     scaled_difference,
 )
-from renderer.numerics.simd import larger
+from renderer.numerics.simd import maximum
 from renderer.numerics.vec3 import largest_component, largest_of_three, sub
 from renderer.trace.starts.record import BARYCENTRIC
 
@@ -51,7 +51,7 @@ def anchor_of(start):
     """
     p0, p1, p2 = corners = start.corners
     side = largest_of_three(sub(p1, p0), sub(p2, p1), sub(p0, p2))
-    unit = power_below(larger(side, _LEAST_NORMAL))
+    unit = power_below(maximum(side, _LEAST_NORMAL))
     if start.code & BARYCENTRIC != 0:
         return _at_weights(corners, start.anchor[0], start.anchor[1], unit)
     return _nearest(corners, start.anchor, unit)
@@ -120,7 +120,7 @@ def _along(corners, i, j, share, unit):
 @kernel
 def _at_weights(corners, u, v, unit):
     """The point (1 - u - v) p0 + u p1 + v p2."""
-    u, v = larger(u, 0.0), larger(v, 0.0)
+    u, v = maximum(u, 0.0), maximum(v, 0.0)
     w = minus(exact_sum(1.0, -u), (v, 0.0))
     if w[0] <= 0.0:
         return _along(corners, 1, 2, quotient((v, 0.0), exact_sum(u, v)), unit)

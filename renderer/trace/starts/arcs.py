@@ -7,7 +7,7 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import cross_pairs, heads, negative, power_below
-from renderer.numerics.simd import at
+from renderer.numerics.simd import offset
 from renderer.numerics.vec3 import largest_component
 from renderer.trace.starts.cone import (
     FIRST_NODE,
@@ -48,7 +48,7 @@ def arcs_of(tree, anchor, holders, count):
     number = _cut(tree, anchor, holders, count)
     if number == 0:
         return holders, count, name_nodes(tree, anchor, holders, count)
-    arcs = Holders(at(holders.holders, count * HOLDER_WORDS), holders.nodes)
+    arcs = Holders(offset(holders.holders, count * HOLDER_WORDS), holders.nodes)
     return arcs, number, _name_ends(arcs, number)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import cross_pairs, dot_pairs, heads, plus, power_below, product, scaled_difference
-from renderer.numerics.simd import at, get, put
+from renderer.numerics.simd import load, offset, store
 from renderer.numerics.vec3 import largest_component, sub
 from renderer.trace.edge_signs import corner
 from renderer.trace.starts.anchor import from_anchor
@@ -43,27 +43,27 @@ class Holders(NamedTuple):
 @inlined
 def make_holders(words):
     """``Holders`` in HOLDERS_WORDS int64."""
-    return Holders(words, at(words, MOST_HOLDERS * HOLDER_WORDS))
+    return Holders(words, offset(words, MOST_HOLDERS * HOLDER_WORDS))
 
 
 @inlined
 def holder(holders, k, word):
-    return get(holders.holders, k * HOLDER_WORDS + word)
+    return load(holders.holders, k * HOLDER_WORDS + word)
 
 
 @inlined
 def put_holder(holders, k, word, value):
-    put(holders.holders, k * HOLDER_WORDS + word, np.int64(value))
+    store(holders.holders, k * HOLDER_WORDS + word, np.int64(value))
 
 
 @inlined
 def node(holders, k, word):
-    return get(holders.nodes, k * _NODE_WORDS + word)
+    return load(holders.nodes, k * _NODE_WORDS + word)
 
 
 @inlined
 def put_node(holders, k, word, value):
-    put(holders.nodes, k * _NODE_WORDS + word, np.int64(value))
+    store(holders.nodes, k * _NODE_WORDS + word, np.int64(value))
 
 
 @kernel
@@ -82,8 +82,8 @@ def add_holder(tree, holders, count, place, face, zeros):
 def put_way(holders, k, word, a):
     """Write a way, a vector of pairs, to a holder."""
     for i in range(3):
-        put(holders.holders, k * HOLDER_WORDS + word + 2 * i, np.float64(a[i][0]).view(np.int64))
-        put(holders.holders, k * HOLDER_WORDS + word + 2 * i + 1, np.float64(a[i][1]).view(np.int64))
+        store(holders.holders, k * HOLDER_WORDS + word + 2 * i, np.float64(a[i][0]).view(np.int64))
+        store(holders.holders, k * HOLDER_WORDS + word + 2 * i + 1, np.float64(a[i][1]).view(np.int64))
 
 
 @inlined

@@ -8,7 +8,7 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import heads
-from renderer.numerics.simd import at, get, put
+from renderer.numerics.simd import load, offset, store
 from renderer.numerics.vec3 import cross, dot, largest_component, normalized, three
 from renderer.trace.starts.cone import (
     FIRST_NODE,
@@ -44,25 +44,25 @@ def fan_doubles(count):
 @inlined
 def size_of_fan(table):
     """The float64 of a table."""
-    return fan_doubles(np.int64(get(table, _COUNT)))
+    return fan_doubles(np.int64(load(table, _COUNT)))
 
 
 @inlined
 def clear_fan(table):
     """Let there be no table."""
-    put(table, _COUNT, 0.0)
+    store(table, _COUNT, 0.0)
 
 
 @inlined
 def has_fan(table):
-    return get(table, _COUNT) > 0.0
+    return load(table, _COUNT) > 0.0
 
 
 @inlined
 def _put3(base, first, a):
-    put(base, first, a[0])
-    put(base, first + 1, a[1])
-    put(base, first + 2, a[2])
+    store(base, first, a[0])
+    store(base, first + 1, a[1])
+    store(base, first + 2, a[2])
 
 
 @kernel
@@ -77,8 +77,8 @@ def write_fan(tree, anchor, holders, count, nodes, k, side, table, room):
         sound = path_to_cone(tree, anchor, holders, count, k, side, attempt, PATH)
         if sound and _write_rows(tree, anchor, holders, count, heads(hub_of(attempt)), table):
             # rule: closed-fan
-            put(table, _CLOSED, np.float64(_are_closed(holders, count, nodes)))
-            put(table, _COUNT, np.float64(count))
+            store(table, _CLOSED, np.float64(_are_closed(holders, count, nodes)))
+            store(table, _COUNT, np.float64(count))
             return
 
 
@@ -87,7 +87,7 @@ def _write_rows(tree, anchor, holders, count, hub, table):
     """Write the rows of all faces; returns whether the hub is far from their planes."""
     parity = np.int64(0)
     for j in range(count):
-        cone, row = cone_of(tree, anchor, holders, j), at(table, FAN_HEAD + _ROW * j)
+        cone, row = cone_of(tree, anchor, holders, j), offset(table, FAN_HEAD + _ROW * j)
         n = normalized(heads(cone.face.normal))
         first, second = cross(n, normalized(heads(cone.first))), cross(n, normalized(heads(cone.second)))
         if abs(dot(n, hub)) < _LEAST:
@@ -98,11 +98,11 @@ def _write_rows(tree, anchor, holders, count, hub, table):
         # What has no outline holds every place of its plane.
         products = dot(n, hub), dot(first, hub) if cone.kind > 0 else 1.0, dot(second, hub) if cone.kind > 1 else -1.0
         _put3(row, _HUB, products)
-        put(row, _PATH, np.float64(holder(holders, j, PATH)))
-        put(row, _NODES, np.float64(holder(holders, j, FIRST_NODE)))
-        put(row, _NODES + 1, np.float64(holder(holders, j, SECOND_NODE)))
+        store(row, _PATH, np.float64(holder(holders, j, PATH)))
+        store(row, _NODES, np.float64(holder(holders, j, FIRST_NODE)))
+        store(row, _NODES + 1, np.float64(holder(holders, j, SECOND_NODE)))
         parity ^= holder(holders, j, PATH)
-    put(table, _PARITY, np.float64(parity))
+    store(table, _PARITY, np.float64(parity))
     return True
 
 
@@ -134,14 +134,14 @@ def _are_closed(holders, count, nodes):
 @inlined
 def _crosses(row, d, size):
     """The parity of the path from the hub to d, of largest component ``size``: -1 where rounding may have made it."""
-    g, h = get(row, _HUB), dot(three(row, _NORMAL), d)
+    g, h = load(row, _HUB), dot(three(row, _NORMAL), d)
     if abs(h) <= _ROUNDED * size:
         return -1
     if (g > 0.0) == (h > 0.0):
         return 0
     g, h = abs(g), abs(h)
-    first = h * get(row, _HUB + 1) + g * dot(three(row, _FIRST), d)
-    second = -(h * get(row, _HUB + 2) + g * dot(three(row, _SECOND), d))
+    first = h * load(row, _HUB + 1) + g * dot(three(row, _FIRST), d)
+    second = -(h * load(row, _HUB + 2) + g * dot(three(row, _SECOND), d))
     rounded = _ROUNDED * size
     if first < -rounded or second < -rounded:
         return 0
@@ -151,18 +151,18 @@ def _crosses(row, d, size):
 @kernel
 def stop_of(table, d, holders):
     """Whether a ray in direction d is stopped at the start of a table: OPEN, STOPPED, or UNSURE by rounding."""
-    count, size, parity = np.int64(get(table, _COUNT)), largest_component(d), np.int64(get(table, _PARITY))
-    closed = get(table, _CLOSED) != 0.0
+    count, size, parity = np.int64(load(table, _COUNT)), largest_component(d), np.int64(load(table, _PARITY))
+    closed = load(table, _CLOSED) != 0.0
     for j in range(count):
-        row = at(table, FAN_HEAD + _ROW * j)
+        row = offset(table, FAN_HEAD + _ROW * j)
         crossed = _crosses(row, d, size)
         if crossed < 0:
             return UNSURE
         parity ^= crossed
         if not closed:
-            put_holder(holders, j, FIRST_NODE, get(row, _NODES))
-            put_holder(holders, j, SECOND_NODE, get(row, _NODES + 1))
-            put_holder(holders, j, PATH, get(row, _PATH))
+            put_holder(holders, j, FIRST_NODE, load(row, _NODES))
+            put_holder(holders, j, SECOND_NODE, load(row, _NODES + 1))
+            put_holder(holders, j, PATH, load(row, _PATH))
             put_holder(holders, j, OTHER_PATH, crossed)
     if closed:
         return OPEN if parity == 0 else STOPPED

@@ -10,7 +10,7 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import as_pairs, dot_pairs, quotient
-from renderer.numerics.simd import get, larger, smaller
+from renderer.numerics.simd import load, maximum, minimum
 from renderer.numerics.vec3 import add, barycentric, cross, dot, largest_component, largest_of_three, length, sub
 from renderer.trace.edge_signs import corners_at
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
@@ -81,7 +81,7 @@ def _is_below(p, q, error):
 @inlined
 def are_level(p, q):
     """Whether two faces are in one plane, but for the rounding of their corners."""
-    error = CORNER_ERROR * larger(largest_of_three(*p), largest_of_three(*q))
+    error = CORNER_ERROR * maximum(largest_of_three(*p), largest_of_three(*q))
     return _is_below(p, q, error) and _is_below(q, p, error)
 
 
@@ -131,7 +131,7 @@ def _passed_at(tree, place, met):
 def _spot_of(tree, place, number, met):
     """The ``Spot`` of a member."""
     _, around = _areas_at(corners_at(tree, place), met.o)
-    e0, e1, e2 = larger(around[0], 0.0), larger(around[1], 0.0), larger(around[2], 0.0)
+    e0, e1, e2 = maximum(around[0], 0.0), maximum(around[1], 0.0), maximum(around[2], 0.0)
     whole = e0 + e1 + e2
     return Spot(number, e1 / whole, e2 / whole)
 
@@ -208,8 +208,8 @@ def _enter(tree, query, node, count):
 def _list_in(tree, query, first, blocks, count):
     """List those of the faces of some blocks that touch others and may hold a point."""
     for slot in range(first * BLOCK_FACES, (first + blocks) * BLOCK_FACES):
-        face = get(tree.faces, slot)
-        if face >= 0 and get(query.touching, face) != 0:
+        face = load(tree.faces, slot)
+        if face >= 0 and load(query.touching, face) != 0:
             place = slot // BLOCK_FACES * BLOCK_WORDS + slot % BLOCK_FACES
             held = _hold_sign(corners_at(tree, place), query.o, query.room)
             if held >= 0:
@@ -222,12 +222,12 @@ def _hold_sign(corners, o, room):
     """Whether a face holds a point: 1 if it does, -1 if not, 0 where rounding may matter."""
     a, b, c = corners
     for k in range(3):
-        low, high = smaller(a[k], smaller(b[k], c[k])), larger(a[k], larger(b[k], c[k]))
+        low, high = minimum(a[k], minimum(b[k], c[k])), maximum(a[k], maximum(b[k], c[k]))
         if o[k] < low - room or o[k] > high + room:
             return -1
     n, (e0, e1, e2) = _areas_at(corners, o)
     reach = largest_of_three(sub(a, o), sub(b, o), sub(c, o))
-    error, least = _BESIDE * largest_component(n) * reach * (reach + room), smaller(e0, smaller(e1, e2))
+    error, least = _BESIDE * largest_component(n) * reach * (reach + room), minimum(e0, minimum(e1, e2))
     return 1 if least > error else (-1 if least < -error else 0)
 
 

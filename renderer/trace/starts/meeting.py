@@ -20,7 +20,7 @@ from renderer.numerics.double_double import (
     scaled_difference,
 )
 from renderer.numerics.predicates import UNDECIDED, slope_sign, volume_sign
-from renderer.numerics.simd import larger, local_doubles
+from renderer.numerics.simd import local_doubles, maximum
 from renderer.numerics.vec3 import largest_component, largest_of_three, scale, sub
 from renderer.trace.edge_signs import corners_at
 from renderer.trace.starts.anchor import from_anchor
@@ -89,7 +89,7 @@ def seen_from(tree, place, anchor):
     p0, p1, p2 = corners_at(tree, place)
     o = anchor.base
     reach = largest_of_three(sub(p0, o), sub(p1, o), sub(p2, o))
-    factor = 1.0 / power_below(larger(reach, _LEAST_NORMAL))
+    factor = 1.0 / power_below(maximum(reach, _LEAST_NORMAL))
     one, other = scaled_difference(p1, p0, factor), scaled_difference(p2, p0, factor)
     sides = largest_component(heads(one)) * largest_component(heads(other))
     return SeenFace(
@@ -253,7 +253,7 @@ def meet_face(face, anchor, d, slope_there, dz):
         return _none()
     t = quotient(dot_pairs(face.normal, face.a0), dot_pairs(face.normal, way))
     u, v, w = _weights(e0, e1, e2, slope, dz)
-    return Meeting(IS_HIT, larger(t[0], 0.0) / face.factor, u, v, w, _zeros(s0, s1, s2))
+    return Meeting(IS_HIT, maximum(t[0], 0.0) / face.factor, u, v, w, _zeros(s0, s1, s2))
 
 
 @kernel

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined
-from renderer.numerics.simd import address, at, float64_pointer, get, int32_pointer, pointer
+from renderer.numerics.simd import address, float64_pointer, int32_pointer, load, offset, pointer
 from renderer.numerics.vec3 import largest_component, row3, scale, three
 
 # The head of an array of starts, int64: the float64 of a row that each ray is after the one before, 0 where no ray
@@ -51,18 +51,18 @@ def start_pointers(starts):
     head = pointer(starts)
     return StartPointers(
         float64_pointer(address(starts) + 8 * HEAD),
-        get(head, ROW_STEP),
-        float64_pointer(get(head, VERTICES)),
-        int32_pointer(get(head, FACES)),
+        load(head, ROW_STEP),
+        float64_pointer(load(head, VERTICES)),
+        int32_pointer(load(head, FACES)),
     )
 
 
 @inlined
 def start_at(starts, i, unit):
     """The ``Start`` of ray ``i``, whose face is not -1, in units of which ``unit`` are one of the mesh."""
-    row = at(starts.rows, i * starts.step)
-    face, code = np.int64(get(row, FACE)), np.int64(get(row, CODE))
-    anchor = (get(row, ANCHOR), get(row, ANCHOR + 1), get(row, ANCHOR + 2))
+    row = offset(starts.rows, i * starts.step)
+    face, code = np.int64(load(row, FACE)), np.int64(load(row, CODE))
+    anchor = (load(row, ANCHOR), load(row, ANCHOR + 1), load(row, ANCHOR + 2))
     if code & BARYCENTRIC == 0:
         anchor = scale(anchor, unit)
     return Start(corners_of(starts.vertices, starts.faces, face, unit), anchor, face, code)

@@ -10,7 +10,7 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import as_pairs, cross_pairs, dot_pairs, power_below, quotient, scaled_difference
-from renderer.numerics.simd import get, larger, local_doubles, lowest_bit, pointer, put, smaller
+from renderer.numerics.simd import load, local_doubles, lowest_bit, maximum, minimum, pointer, store
 from renderer.numerics.vec3 import add, largest_component, sub
 from renderer.trace.best import NO_FACE, Best, FaceHit, hit_on, is_better, no_hit
 from renderer.trace.edge_signs import corners_at
@@ -75,7 +75,7 @@ def _box_holds(tree, place, o):
     p0, p1, p2 = corners_at(tree, place)
     holds, room = True, largest_component(o) * _ROOM
     for k in range(3):
-        low, high = smaller(p0[k], smaller(p1[k], p2[k])), larger(p0[k], larger(p1[k], p2[k]))
+        low, high = minimum(p0[k], minimum(p1[k], p2[k])), maximum(p0[k], maximum(p1[k], p2[k]))
         holds = holds and low - room <= o[k] and o[k] <= high + room
     return holds
 
@@ -115,7 +115,7 @@ def _add_holders(tree, query, first, blocks, count):
     """List those faces of some blocks that hold an anchor."""
     for block in range(first, first + blocks):
         for i in range(BLOCK_FACES):
-            face, place = get(tree.faces, block * BLOCK_FACES + i), block * BLOCK_WORDS + i
+            face, place = load(tree.faces, block * BLOCK_FACES + i), block * BLOCK_WORDS + i
             if face >= 0 and _box_holds(tree, place, query.o):
                 met = meet_face(seen_from(tree, place, query.anchor), query.anchor, query.d, query.slope, query.dz)
                 if met.kind == HOLDS:
@@ -203,7 +203,7 @@ def meet_near(tree, place, departure, dz):
     """The ``FaceHit`` of a face that is met from the exact start, and its ``Meeting.zeros``."""
     met = meet_face(seen_from(tree, place, departure.anchor), departure.anchor, departure.d, departure.slope, dz)
     # rule: met-once
-    t = larger(met.t / departure.unit, _LEAST_T) if met.kind == IS_HIT else np.nan
+    t = maximum(met.t / departure.unit, _LEAST_T) if met.kind == IS_HIT else np.nan
     return FaceHit(t, met.u, met.v, met.w), met.zeros
 
 
@@ -218,7 +218,7 @@ def _nearest_from(tree, first, count, departure, shear, best):
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
-            face = get(tree.faces, block * BLOCK_FACES + i)
+            face = load(tree.faces, block * BLOCK_FACES + i)
             if np.float64(face) == ray.leaving:
                 continue
             if (near >> i) & 1 != 0:
@@ -268,10 +268,10 @@ def t_from(tree, starts, i, ray, face, t):
     """Where a ray meets the plane of a face that it hits at t, counted from its exact start."""
     anchor, (d, unit) = anchor_of(start_at(starts, i, tree.scale)), unit_direction((ray.dx, ray.dy, ray.dz))
     p0, p1, p2 = corners_of(starts.vertices, starts.faces, face, tree.scale)
-    side = larger(largest_component(sub(p1, p0)), largest_component(sub(p2, p0)))
+    side = maximum(largest_component(sub(p1, p0)), largest_component(sub(p2, p0)))
     factor = 1.0 / power_below(side)
     normal = cross_pairs(scaled_difference(p1, p0, factor), scaled_difference(p2, p0, factor))
-    far = 1.0 / power_below(larger(largest_component(sub(p0, rounded(anchor))), 1.0 / factor))
+    far = 1.0 / power_below(maximum(largest_component(sub(p0, rounded(anchor))), 1.0 / factor))
     exact = quotient(dot_pairs(normal, from_anchor(anchor, p0, far)), dot_pairs(normal, as_pairs(d)))[0] / far / unit
     return exact if exact > 0.0 and abs(exact - t) <= t else t
 
@@ -304,17 +304,17 @@ def take_side(tree, starts, n, stack, memory, table, room):
     write_fan(tree, anchor, arcs, number, nodes, k, side, table, room)
     row = starts.rows
     # rule: side-of-normal
-    put(row, CODE, np.float64(start.code | KNOWN | BACK | (ABOVE if side > 0 else 0)))
+    store(row, CODE, np.float64(start.code | KNOWN | BACK | (ABOVE if side > 0 else 0)))
     if holder(arcs, k, NUMBER) == start.face:
         return
-    put(row, FACE, np.float64(holder(arcs, k, NUMBER)))
+    store(row, FACE, np.float64(holder(arcs, k, NUMBER)))
     # A point is on both faces, but barycentrics are those of one.
     if start.code & BARYCENTRIC != 0:
         met = meet_face(seen_from(tree, holder(arcs, k, PLACE), anchor), anchor, d, slope, 1.0)
         u, v = barycentrics_of(met)
-        put(row, ANCHOR, u)
-        put(row, ANCHOR + 1, v)
-        put(row, ANCHOR + 2, 0.0)
+        store(row, ANCHOR, u)
+        store(row, ANCHOR + 1, v)
+        store(row, ANCHOR + 2, 0.0)
 
 
 @kernel

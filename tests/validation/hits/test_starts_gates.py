@@ -13,7 +13,7 @@ from validation.hits.bodies import Body
 from validation.job import Job
 from validation.thresholds import Thresholds
 
-EFFORT = starts.StartEffort(rays=300, exact=60)
+EFFORT = starts.StartEffort(rays=900, exact=60)
 
 
 def job() -> Job:
@@ -40,7 +40,7 @@ SAMPLES = {
 @cases("name", SAMPLES)
 def test_who_keeps_the_law_is_never_wrong(name):
     found = checked(SAMPLES[name])
-    assert found.rays > 200 and found.exact > 30
+    assert found.rays > 600 and found.exact > 30
     assert found[2:] == (0, 0, 0, 0)
 
 

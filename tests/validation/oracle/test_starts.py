@@ -100,6 +100,50 @@ def test_a_prism_is_a_wedge_at_its_edge(degrees):
                 assert found == [First(ZERO, stops[0], (stops[0],))]
 
 
+def test_two_cubes_that_touch_along_an_edge_leave_four_wedges():
+    vertices, faces = joined(cube((0, 0, 0)), cube((-2, -2, 0)))
+    surface, along = Surface(vertices, faces), normals(vertices, faces)
+    point = place(0, 0, Fraction(1, 3))
+    at = held(surface, point)
+    assert len(at) == 4
+    for face, side, way in product(at, (-1, 1), WAYS):
+        # Each wedge is a quarter; the one beside the face is where its own side and its own half are.
+        middle = vertices[faces[face]].mean(axis=0) * [1, 1, 0]
+        beside = np.sign(middle + side * along[face])[:2]
+        stops = [f for f in at if way_beyond(along[f], way, beside)]
+        (found,) = surface.first(Start(point, face), way, side)
+        if all(beside * way[:2] >= 0):
+            assert found.face not in at
+        else:
+            assert found == First(ZERO, stops[0], (stops[0],)), (face, side, way)
+
+
+def way_beyond(normal, way, quarter):
+    """Whether a wall of a quarter, known by its normal, has the quarter on one side and a direction on the other.
+
+    The wall x = 0 of the cubes has y of the cube's sign; which quarters it borders follows from that.
+    """
+    axis = int(np.abs(normal[:2]).argmax())
+    # The first cube is where both are positive, its normals look to the negative; the second is the other way.
+    half = -np.sign(normal[axis])
+    return quarter[1 - axis] == half and quarter[axis] * way[axis] < 0
+
+
+def test_two_cubes_that_touch_at_a_corner_leave_one_outside():
+    vertices, faces = joined(cube((0, 0, 0)), cube((-2, -2, -2)))
+    surface = Surface(vertices, faces)
+    at = held(surface, place(0, 0, 0))
+    first, second = [f for f in at if f < 12], [f for f in at if f >= 12]
+    for face, way in product(at, WAYS):
+        (found,) = surface.first(Start(place(0, 0, 0), face), way, 1)
+        if min(way) > 0:
+            assert found == First(ZERO, first[0], (first[0],))
+        elif max(way) < 0:
+            assert found == First(ZERO, second[0], (second[0],))
+        else:
+            assert found.face not in at
+
+
 def test_two_cubes_with_a_common_side_have_three_regions_there():
     """Between coinciding faces there is nothing: turned back, both are behind; through one, the next is ahead."""
     vertices, faces = joined(cube((0, 0, 0)), cube((2, 0, 0)))
@@ -147,6 +191,18 @@ def test_partly_coinciding_faces_stop_a_ray_only_where_they_overlap():
     # The point (1, 2, 0) lies within both.
     inner = start_on(corners[:3], 0.25, 0.5)
     assert surface.first(Start(inner, 0), (0, 0, 1), 1, True) == [First(ZERO, 1, (1,))]
+
+
+def test_an_open_fan_is_one_region():
+    rim = np.array([[3, 0, 1], [0, 3, -1], [-3, 0, 1], [0, -3, 2]], float)
+    vertices = np.concatenate([[[0, 0, 0]], rim])
+    closed = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]]
+    for left_out in range(4):
+        surface = Surface(vertices, closed[:left_out] + closed[left_out + 1 :])
+        for face, side, way in product(range(3), (-1, 1), WAYS):
+            assert surface.first(Start(place(0, 0, 0), face), way, side) == [First(None, -1, ())]
+    surface = Surface(vertices, closed)
+    assert all(surface.first(Start(place(0, 0, 0), f), (0, 0, 1), -1)[0].face == 0 for f in range(4))
 
 
 def test_where_faces_cross_each_region_has_its_answer():

@@ -123,7 +123,7 @@ def test_a_ball_that_hides_itself_and_one_that_hides_nothing_are_found(monkeypat
         changed(patch, "visible", lambda found: found & False)
         assert broken("views") == {"a ball's centre", "what is in", "what is nearer", "a point sees", "each pair of"}
     changed(monkeypatch, "visible", lambda found: found | True)
-    assert broken("views") == {"nothing is seen", "what is in", "a point sees", "each pair of"}
+    assert broken("views") == {"nothing is seen", "what is in", "what is nearer", "a point sees", "each pair of"}
 
 
 def test_edges_that_are_counted_otherwise_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
