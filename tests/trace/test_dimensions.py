@@ -37,6 +37,7 @@ def test_rays_of_any_dimensions_go_on_through_coinciding_faces(queries, shape):
     assert not hits.hit.any() and not flat.hit.any()
 
 
+@pytest.mark.judges("Hits.shaped")
 def test_hits_of_other_dimensions_have_all_that_hits_have():
     """Each field, its own too, at coinciding faces: there a ray has come upon another face than it hit."""
     octree, down = Octree.from_mesh(TWICE), [0.0, 0.0, -1.0]

@@ -43,7 +43,7 @@ def test_no_error_is_above_its_bound(kind, offset, scale):
     else:
         vertices, faces = make_mesh(kind, 3, 200)
     vertices = np.asarray(vertices) * scale + offset * scale
-    origins, directions = rays_at(vertices, faces, 5, 120)
+    origins, directions = rays_at(vertices, faces, 5, 50)
     octree = Octree(vertices, faces)
     hits = octree.closest_hit(origins, directions, t_error=True)
     got = shares(octree, origins, directions, hits, np.flatnonzero(hits.hit))

@@ -41,7 +41,7 @@ def beside(distance):
 
 @pytest.fixture(scope="module")
 def flat():
-    return flat_overlapping(2000)
+    return flat_overlapping(1000)
 
 
 @pytest.fixture(scope="module")
