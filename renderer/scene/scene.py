@@ -21,7 +21,7 @@ from renderer.mesh.mesh import Mesh
 from renderer.scene.camera import OrthographicCamera, PerspectiveCamera, sample_offsets
 from renderer.scene.fields import Color, Fields, FiniteVector, Keys, first_fault, shown, thrice
 from renderer.scene.light import DirectionalLight, PointLight
-from renderer.scene.material import Dielectric, Material, Mirror, Phong
+from renderer.scene.material import Material
 from renderer.scene.showcase import showcase_text
 from renderer.system.files import as_path, read_whole, write_atomically
 
@@ -38,7 +38,7 @@ def _typed(default: str) -> BeforeValidator:
 AnyCamera = Annotated[
     Annotated[PerspectiveCamera | OrthographicCamera, Field(discriminator="type")], _typed("perspective")
 ]
-AnyMaterial = Annotated[Annotated[Phong | Mirror | Dielectric, Field(discriminator="type")], _typed("phong")]
+AnyMaterial = Annotated[Annotated[Material, Field(discriminator="type")], _typed("phong")]
 AnyLight = Annotated[DirectionalLight | PointLight, Field(discriminator="type")]
 # A side of the largest picture.
 MOST_PIXELS = 16384

@@ -390,11 +390,11 @@ def _tile_from(rows, steps, begin):
 def sweep(descriptor, vertices, faces, places, sky, answers, rows, steps, begin, k, arrays):
     """Let the points in ``rows``, one tile after the other, look in all directions; some rays more with each call.
 
-    descriptor      those of the tree, over ``vertices`` and ``faces``
-    steps      those of the curve to the rows; none where the points are too far apart for their rays to be traced
-               together
-    begin, k   where the tile under way begins, and its next direction: 0, 0 in the first call, and later what the last
-               one returned, with the same ``arrays``, a ``SweepScratch``
+    descriptor  that of the tree over ``vertices`` and ``faces``
+    steps       those of the curve to the rows; none where the points are too far apart for their rays to be traced
+                together
+    begin, k    where the tile under way begins, and its next direction: 0, 0 in the first call, and later what the
+                last one returned, with the same ``arrays``, a ``SweepScratch``
 
     All is done at (len(rows), 0).
     """

@@ -173,11 +173,6 @@ class Leaving(NamedTuple):
     anchors: NDArray[np.float64]
 
 
-def by_faces(faces: NDArray[np.int64]) -> Leaving:
-    """Rays that leave faces of which no side is known."""
-    return Leaving(faces, np.zeros(1, np.int64), np.empty((0, 3)))
-
-
 def offset_origins(rays: RayBatch, leaving: Leaving, mesh: Mesh, scale: float, threads: int) -> RayBatch:
     """The rays with their origins moved off the faces that they leave, see ``spawn.offset_from_faces``, and with their
     ``starts``; ``scale`` is the tree's.

@@ -96,7 +96,7 @@ def plane_distance(vertices, face, point):
 
 
 def test_starts_are_beyond_the_plane_by_no_more_than_roundings_and_above_the_nearest_point_of_it():
-    from renderer.trace.batch import by_faces, check_rays, offset_origins
+    from renderer.trace.batch import Leaving, check_rays, offset_origins
 
     ball = icosphere(2)
     for offset in OFFSETS:
@@ -105,7 +105,8 @@ def test_starts_are_beyond_the_plane_by_no_more_than_roundings_and_above_the_nea
         face, points, directions = on_faces(vertices, ball.faces, 5, 300)
         # Some lie off the plane, on either side, by more than rounding.
         points[::3] += 1e-6 * ball.face_normals()[face[::3]] * np.random.default_rng(0).choice([-1, 1], (100, 1))
-        rays = offset_origins(check_rays(points, directions, 0.0, np.inf)[0], by_faces(face), octree.mesh, 1.0, 1)
+        no_side = Leaving(face, np.zeros(1, np.int64), np.empty((0, 3)))
+        rays = offset_origins(check_rays(points, directions, 0.0, np.inf)[0], no_side, octree.mesh, 1.0, 1)
         normals = ball.face_normals()[face]
         slack = rays.starts[HEAD:].view(np.float64).reshape(-1, ROW)[:, SLACK]
         edge = slack == EDGE
