@@ -55,7 +55,8 @@ def run(
     """Inject every defect whose answer is not ``known``; returns a record for JSON and the gates.
 
     One gate requires that no gate fails for the sound renderer, and one for each defect that some gate fails. A run of
-    the whole list has one more, ``idle``.
+    the whole list has one more, ``idle``. Raises ``ChildProcessError`` where the checks end with an error without any
+    defect.
     """
     known = Known() if known is None else known
     groups = sorted({defect.group for defect in defects})
@@ -63,6 +64,8 @@ def run(
         sound, broken = Path(folder) / "sound", Path(folder) / "broken"
         step("defects: none, as the control")
         control = together(list(pool.map(lambda group: run_checks(None, group, sound, modules), groups)))
+        if control.error is not None:
+            raise ChildProcessError(f"defects: the checks of the sound renderer end with {control.error}")
 
         def answer(numbered: tuple[int, Defect]) -> Answer:
             number, defect = numbered

@@ -40,12 +40,14 @@ DEFECTS = [next(defect for defect in ALL if defect.name == "sRGB applied twice")
         "nonsense": value("1 // 0"),
         "endless": value("exec('while True: pass')"),
     }.items()
-]
+] + [Defect("studies", "without a judge", Rule("rounded-encoding", value("_")))]
 
 def run(group):
     from renderer.picture.image import srgb
     from validation.gates import Gate
 
+    if group == "studies":
+        raise OSError("no judge")
     wrong = float(srgb([0.0, 0.5, 1.0]).tolist() != [0, 188, 255])
     return [Gate("images", group, "8-bit steps", wrong, "at most", 0.0, "the formula")]
 """
@@ -187,6 +189,12 @@ def test_an_error_is_no_verdict(tmp_path: Path, tiny: defects.Modules) -> None:
     known = Known(tmp_path / "known.json")
     known.add("nonsense", answer)
     assert known.answers == {}
+
+
+def test_checks_that_fail_without_a_defect_end_the_run(tiny: defects.Modules) -> None:
+    """Each defect was tried, though all would end with that error."""
+    with pytest.raises(ChildProcessError, match="checks of the sound renderer end with OSError: no judge"):
+        defects.run(defects.chosen(True, tiny)[-1:], lambda name: None, tiny)
 
 
 def test_a_defect_that_never_ends_is_caught(tmp_path: Path, tiny: defects.Modules, monkeypatch: Any) -> None:
