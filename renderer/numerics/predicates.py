@@ -26,20 +26,22 @@ def area_sign(a, b, p, parts):
 @kernel
 def volume_sign(a, b, c, p, parts):
     """The sign of (a - p) . ((b - p) x (c - p)), as of ``area_sign``."""
-    count = expand_volume(a, b, c, p, parts)
-    if count == OUT_OF_RANGE:
-        s = balance(a[0], b[0], c[0], p[0]), balance(a[1], b[1], c[1], p[1]), balance(a[2], b[2], c[2], p[2])
-        count = expand_volume(stretched(a, s), stretched(b, s), stretched(c, s), stretched(p, s), parts)
-    return UNDECIDED if count == OUT_OF_RANGE else sign_of(parts, count)
+    return _sign_in_range(expand_volume, a, b, c, p, parts)
 
 
 @kernel
 def slope_sign(a, b, c, d, parts):
     """The sign of ((b - a) x (c - a)) . d, as of ``area_sign``."""
-    count = expand_slope(a, b, c, d, parts)
+    return _sign_in_range(expand_slope, a, b, c, d, parts)
+
+
+@inlined
+def _sign_in_range(expand, a, b, c, d, parts):
+    """The sign of what ``expand`` makes of four points, stretched where its products are out of range."""
+    count = expand(a, b, c, d, parts)
     if count == OUT_OF_RANGE:
         s = balance(a[0], b[0], c[0], d[0]), balance(a[1], b[1], c[1], d[1]), balance(a[2], b[2], c[2], d[2])
-        count = expand_slope(stretched(a, s), stretched(b, s), stretched(c, s), stretched(d, s), parts)
+        count = expand(stretched(a, s), stretched(b, s), stretched(c, s), stretched(d, s), parts)
     return UNDECIDED if count == OUT_OF_RANGE else sign_of(parts, count)
 
 

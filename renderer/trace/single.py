@@ -8,7 +8,7 @@ from renderer.trace.best import NO_FACE, Best, no_hit
 from renderer.trace.intersect import largest_of, make_shear
 from renderer.trace.leaf import nearest_carefully, tree_pointers
 from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers, write_hit
-from renderer.trace.single_ray import Found, enter_node, prepare_single
+from renderer.trace.single_ray import Found, enter_counted, prepare_single
 from renderer.trace.starts.record import EDGE, PILE
 from renderer.trace.starts.search import NEAR_HIT, search_from, t_from
 from renderer.trace.walk import stack_size, walk
@@ -26,13 +26,7 @@ def search_singly(tree, ray, t_max, stack):
     """
     # rule: first-limit
     best = no_hit(t_max)
-    return walk(tree, stack, prepare_single(ray), Found(best, np.int64(0)), _enter, _visit)
-
-
-@inlined
-def _enter(tree, single, node, found):
-    _, bits = enter_node(tree, node, single, found.best.t)
-    return Found(found.best, found.steps + 1), bits
+    return walk(tree, stack, prepare_single(ray), Found(best, np.int64(0)), enter_counted, _visit)
 
 
 @inlined
@@ -44,7 +38,7 @@ def _visit(tree, single, first, count, found):
 
 @kernel
 def search_carefully(tree, rays, i, stack, holders, any_hit):
-    """``search_singly`` for ray ``i``, or ``search_from`` where it starts on the surface; with ``any_hit`` any hit."""
+    """``search_singly`` for ray ``i``; where it starts on the surface ``search_from``, which ends early for any hit."""
     ray, t_max = ray_at(rays, i)
     if ray.leaving >= 0.0:
         return search_from(tree, rays.starts, i, ray, t_max, stack, holders, any_hit)

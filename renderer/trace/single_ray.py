@@ -50,3 +50,10 @@ def prepare_single(ray):
 def enter_node(tree, node, single, t_max):
     """The entry distances of a node's octants, and the bits of those that a ray meets up to ``t_max``."""
     return enter_boxes(tree.nodes, node, single.slabs, single.lower, splat8(box_limit(t_max, single.largest)))
+
+
+@inlined
+def enter_counted(tree, single, node, found):
+    """``enter_node`` up to the best hit ``Found`` so far, as a ``walk`` enters a node; the node counts as a step."""
+    _, bits = enter_node(tree, node, single, found.best.t)
+    return Found(found.best, found.steps + 1), bits

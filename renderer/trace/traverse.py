@@ -255,6 +255,7 @@ def search_blocks(tree, rays, found, begin, end, holders, any_hit):
         if ray.slack != EDGE:
             best, unresolved = search_all_blocks(tree, ray, t_max, any_hit)
         if unresolved:
+            # Nothing waits on a stack where there are no nodes.
             best = search_carefully(tree, rays, i, holders, holders, any_hit).best
         dz = make_shear(ray).direction_z
         write_best(tree, rays, found, i, best, ray.slack, largest_of(ray), dz, any_hit)

@@ -104,6 +104,11 @@ print(subprocess.run(command, env=child.environment(), capture_output=True, text
     assert f"{renderer.__file__} a b c\\n" in done.stdout  # nothing relative follows
 
 
+def test_what_is_given_for_a_child_is_before_what_this_process_has(monkeypatch):
+    monkeypatch.setenv("OCTREE_RENDERER_QUIET", "0")
+    assert child.environment(OCTREE_RENDERER_QUIET="1")["OCTREE_RENDERER_QUIET"] == "1"
+
+
 def test_a_child_that_fails_is_said_with_its_last_words(monkeypatch, caplog):
     monkeypatch.setattr(precompile, "is_on_disk", lambda kernel: False)
     monkeypatch.setattr(precompile, "available_threads", lambda: 2)

@@ -25,7 +25,7 @@ from renderer.trace.intersect import (
 )
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import octants_around, resolved_hit, tree_pointers
-from renderer.trace.single_ray import Found, SingleRay, enter_node, prepare_single
+from renderer.trace.single_ray import Found, SingleRay, enter_counted, prepare_single
 from renderer.trace.starts.anchor import anchor_of, from_anchor, rounded
 from renderer.trace.starts.arcs import arcs_of
 from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, cone_of, holder, make_holders
@@ -253,8 +253,7 @@ def search_from(tree, starts, i, ray, t_max, stack, memory, any_hit):
 
 @inlined
 def _enter(tree, query, node, found):
-    _, bits = enter_node(tree, node, query.single, found.best.t)
-    return Found(found.best, found.steps + 1), bits
+    return enter_counted(tree, query.single, node, found)
 
 
 @inlined
