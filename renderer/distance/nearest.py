@@ -117,11 +117,12 @@ def find_nearest(descriptor, points, rows, limits, out, integers, doubles, begin
     for i in range(begin, count):
         p, row = offset(pointer(points), 3 * i), rows[i]
         limit = limits[row if len(limits) > 1 else 0]
-        # rule: point-in-tree-units
         point = Point(0, 4, 8, tree.scale * load(p, 0), tree.scale * load(p, 1), tree.scale * load(p, 2))
         store(parts, UNDECIDED_FLAG, 0.0)
         near = _search(tree, point, minimum(limit * tree.scale * _MORE, _FARTHEST), scratch)
-        distance, face = near.distance / tree.scale, near.face
+        # rule: distance-in-mesh-units
+        distance = near.distance / tree.scale
+        face = near.face
         # rule: reach-is-closed
         hit = face != NO_FACE and distance <= limit
         store(found.t, row, distance if hit else np.inf)

@@ -45,7 +45,7 @@ _CHANGES: dict[str, Change] = {
         "bound-of-block", call("select", "select(_0, _1 * splat4(0.5), _2)")
     ),
     "a distance is reached only short of it": Rule("reach-is-closed", compare("<", nth=1)),
-    "distances of scaled meshes keep the tree's units": Rule("point-in-tree-units", without("*", 0)),
+    "distances of scaled meshes keep the tree's units": Rule("distance-in-mesh-units", without("/", 1)),
     "distances whose products vanish are believed": Rule("lost-products", without("and", 0)),
     "distances are negative outside": after("signed.signed_distance", lambda distance: -distance),
     "an end hides itself": Rule("room-before-end", without("-", 1)),
