@@ -413,17 +413,16 @@ def meet_planes(tree, base, edges, seen, ray, t_min, t_max):
         if some & ~left != 0:
             uncertain = determinant_uncertain | near | _may_be_on_edge(edges)
             # Whether the numerator, with its error, may make a t from t_min to t_max. A t that rounding made negative
-            # may be 0.
+            # may be 0. ERROR has the determinant's error too, because the numerator is t times the determinant.
             base_t, error = fabs(denominator), product * sizes.along * splat4(ERROR)
             within = (height + error >= splat4(t_min) * base_t) & (height - error <= splat4(t_max) * base_t)
             ahead, extended = (t >= zero) | (height <= error), _is_extended(edges, sizes)
-            # rule: must-resolve
-            due = (determinant_uncertain | (uncertain & ahead & within)) & extended
+            due = (uncertain & ahead & within & extended) | (height < reach)
             return PlaneHits(
                 t,
                 (seen & movemask(uncertain)) | (some & left),
                 seen & movemask(determinant_uncertain),
-                seen & movemask(due | (height < reach)) & ~left,
+                seen & movemask(due) & ~left,
             )
     return PlaneHits(t, some, np.int64(0), np.int64(0))
 

@@ -100,7 +100,6 @@ _CHANGES: dict[str, Change] = {
     "hits in doubt may lie before their boxes": Rule("t-within-box", drop),
     "faces of no area are never hit": Rule("t-on-line", element(0, "np.nan")),
     "a determinant that is noise is believed": Rule("uncertain-determinant", drop),
-    "streams drop a doubt whose t is noise": Rule("must-resolve", without("|", 0)),
     "determinants that blow roundings up are not in doubt": Constant("SLANT", "2.0**-40"),
     "edges as rounded are believed": Rule("rounded-edge", compare("<")),
     "hits of scaled meshes keep the tree's t": Rule("t-in-mesh-units", without("/", 1)),

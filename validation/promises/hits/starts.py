@@ -6,6 +6,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
 from validation.meshes import loose
 from validation.promises.row import row
@@ -30,7 +31,24 @@ def check_starts(rng: Generator) -> list[dict[str, Any]]:
     return [
         row("a ray does not meet the face that it leaves, however thin", "which face it is", np.concatenate(kept)),
         row("each query leaves a face", "a single face", _alone()),
+        row("a ray from the foot of a wall through the wall is stopped at once", "which face it is", _feet(rng)),
     ]
+
+
+def _feet(rng: Generator) -> NDArray[np.bool_]:
+    """Rays from the foot of a wall, which stands within a face, off the side that they lead away from."""
+    ground = Mesh([[-10, -10, 0], [30, -10, 0], [-10, 30, 0]], [[0, 1, 2]])
+    wall = Mesh([[0, -2, 0], [0, 2, 0], [0, 2, 4], [0, -2, 4]], [[0, 1, 2], [0, 2, 3]])
+    feet, kept = np.zeros((_POINTS, 3)), []
+    feet[:, 1] = rng.uniform(-2.0, 2.0, _POINTS)
+    for first, parts in ((1, [ground, wall]), (0, [wall, ground])):
+        mesh = Mesh.concatenate(parts)
+        for tracer in (Octree.from_mesh(mesh), BruteForce.from_mesh(mesh)):
+            for side in (1, -1):
+                through = tracer.closest_hit(feet, [-side, 0.0, 1.0], leaving=first, side=side)
+                off = tracer.closest_hit(feet, [side, 0.0, 1.0], leaving=first, side=side)
+                kept += [(through.t == 0.0) & np.isin(through.face, [first, first + 1]), ~off.hit]
+    return np.concatenate(kept)
 
 
 def _alone() -> NDArray[np.bool_]:
