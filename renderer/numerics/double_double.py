@@ -10,7 +10,7 @@ import numpy as np
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import maximum
 
-_LEAST_NORMAL = 2.0**-1022
+LEAST_NORMAL = 2.0**-1022
 _SPLITTER = 2.0**27 + 1.0
 _EXPONENT = 0x7FF0000000000000
 
@@ -110,7 +110,7 @@ def length_pair(a):
     if largest == 0.0:
         return 0.0, 0.0
     # Scaled, so that no square vanishes.
-    unit = power_below(maximum(largest, _LEAST_NORMAL))
+    unit = power_below(maximum(largest, LEAST_NORMAL))
     x, y, z = a
     b = (x[0] / unit, x[1] / unit), (y[0] / unit, y[1] / unit), (z[0] / unit, z[1] / unit)
     square = dot_pairs(b, b)

@@ -95,6 +95,14 @@ def three(base, at):
 
 
 @inlined
+def least_axis(a):
+    """The axis along which a vector has its least component."""
+    x, y, z = abs(a[0]), abs(a[1]), abs(a[2])
+    on_x, on_y = x <= y and x <= z, y <= z
+    return (1.0 if on_x else 0.0), (0.0 if on_x or not on_y else 1.0), (0.0 if on_x or on_y else 1.0)
+
+
+@inlined
 def row3(base, i):
     """Row i of a ``pointer`` to rows of three."""
     return three(base, 3 * i)

@@ -15,7 +15,7 @@ from renderer.shade.surface import bounds_at, phong
 from renderer.trace.rays import RayPointers
 from renderer.trace.spawn import Facet, Place, put_start
 from renderer.trace.starts.record import ROW, StartPointers
-from renderer.trace.traverse import search_blocks, trace
+from renderer.trace.traverse import trace_rays
 
 # The surface that a ray of a bundle met, for its light and the rays that it spawns: SURFACE_DOUBLES float64 per ray.
 # GEOMETRIC is the first of the ``Facet``. Where light passes, CHANGE has the ``crossing.Change``, and LAST the
@@ -26,15 +26,6 @@ SURFACE_DOUBLES = 28
 # the row of ``starts.record``.
 _ORIGIN, _DIRECTION, _T_MAX = 0, 3 * SIZE, 6 * SIZE
 _TOWARDS, _ARRIVING, _START, SHADOW_DOUBLES = 7 * SIZE, 10 * SIZE, 13 * SIZE, (13 + ROW) * SIZE
-
-
-@kernel
-def trace_rays(tree, rays, found, count, scratch, any_hit):
-    """``trace`` of the first ``count`` rays, or ``search_blocks`` where the tree has no nodes."""
-    if tree.has_nodes:
-        trace(tree, rays, found, 0, count, scratch, any_hit)
-    else:
-        search_blocks(tree, rays, found, 0, count, scratch.holders, any_hit)
 
 
 @inlined

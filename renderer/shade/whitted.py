@@ -53,7 +53,6 @@ from renderer.shade.direct import (
     put_bounds,
     put_facet,
     put_place,
-    trace_rays,
 )
 from renderer.shade.records import AMBIENT, DIELECTRIC, KIND, MIRROR, REFLECTANCE, TRANSMITTANCE
 from renderer.shade.shading import fresnel, reflect, refract
@@ -62,7 +61,7 @@ from renderer.trace.rays import HitPointers, RayPointers
 from renderer.trace.spawn import OffsetRule, Place, put_start, spawn_origin
 from renderer.trace.starts.level import Spot
 from renderer.trace.starts.record import ROW, StartPointers
-from renderer.trace.traverse import ScratchPointers
+from renderer.trace.traverse import ScratchPointers, trace_rays
 
 
 class Settings(NamedTuple):

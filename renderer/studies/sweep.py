@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import load, minimum, offset, pointer, store
-from renderer.numerics.vec3 import add, cross, dot, largest_component, normalized, put3, row3, scale, three
+from renderer.numerics.vec3 import add, cross, dot, largest_component, least_axis, normalized, put3, row3, scale, three
 from renderer.trace.intersect import CORNER
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import tree_pointers
@@ -46,7 +46,7 @@ from renderer.trace.starts.record import (
     start_at,
 )
 from renderer.trace.starts.search import take_side
-from renderer.trace.traverse import Scratch, ScratchPointers, new_scratch, scratch_pointers, search_blocks, trace
+from renderer.trace.traverse import Scratch, ScratchPointers, new_scratch, scratch_pointers, trace_rays
 
 TILE = 256
 # A tile ends where the curve leaves the largest cell, but not before so many points: else its parts may be far apart,
@@ -184,11 +184,7 @@ def _scratch_pointers(arrays, vertices, faces):
 def _frame_of(normal):
     """Unit vectors across each other, the third one along ``normal``; they depend on it alone."""
     n = normalized(normal)
-    x, y, z = abs(n[0]), abs(n[1]), abs(n[2])
-    # The axis that is farthest from it.
-    on_x, on_y = x <= y and x <= z, y <= z
-    axis = (1.0 if on_x else 0.0), (0.0 if on_x or not on_y else 1.0), (0.0 if on_x or on_y else 1.0)
-    first = normalized(cross(axis, n))
+    first = normalized(cross(least_axis(n), n))
     return first, cross(n, first), n
 
 
@@ -367,10 +363,7 @@ def _trace(tree, scratch, rays, together):
         if trace_parallel(tree, batch, scratch.found, rays, scratch.trace, scratch.parallel):
             return
         store(scratch.numbers, _LEFT, load(scratch.numbers, _LEFT) - 1)
-    if tree.has_nodes:
-        trace(tree, batch, scratch.found, 0, rays, scratch.trace, np.bool_(True))
-    else:
-        search_blocks(tree, batch, scratch.found, 0, rays, scratch.trace.holders, np.bool_(True))
+    trace_rays(tree, batch, scratch.found, rays, scratch.trace, np.bool_(True))
 
 
 @kernel

@@ -10,6 +10,7 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import (
+    LEAST_NORMAL,
     as_pairs,
     cross_pairs,
     dot_pairs,
@@ -35,7 +36,6 @@ _ROUNDED = 2.0**-51
 # Bounds are computed with some roundings themselves. What is denormal loses up to half of the least number, 2^-1075,
 # each time that it is scaled: added where the unit changes.
 _MORE, _LEAST = 1.0 + 2.0**-20, 2.0**-1073
-_LEAST_NORMAL = 2.0**-1022
 
 
 @kernel
@@ -83,7 +83,7 @@ def _plane_error(p0, p1, p2, o, d, t, off):
     """
     reach = largest_of_three(sub(p0, o), sub(p1, o), sub(p2, o))
     side = maximum(largest_component(sub(p1, p0)), largest_component(sub(p2, p0)))
-    far, side = power_below(maximum(reach, _LEAST_NORMAL)), power_below(maximum(side, _LEAST_NORMAL))
+    far, side = power_below(maximum(reach, LEAST_NORMAL)), power_below(maximum(side, LEAST_NORMAL))
     unit = power_below(largest_component(d))
     corner, d, t = scaled_difference(p0, o, 1.0 / far), scale(d, 1.0 / unit), t * unit / far
     one, other = scaled_difference(p1, p0, 1.0 / side), scaled_difference(p2, p0, 1.0 / side)

@@ -241,9 +241,9 @@ def child_of(tree, octant):
 
 
 @inlined
-def meet_octant(tree, rays, at):
+def meet_octant(nodes, rays, at):
     """The bits of the rays that meet the octant whose first word is ``at``."""
-    return meet_box(tree.nodes, at, rays.floats, 0) | (meet_box(tree.nodes, at, rays.floats, 8) << 8)
+    return meet_box(nodes, at, rays.floats, 0) | (meet_box(nodes, at, rays.floats, 8) << 8)
 
 
 @kernel
@@ -276,7 +276,7 @@ def trace_packet(tree, rays, stack, any_hit):
             node, at = child_of(tree, octant)
             if node >= 0:
                 break
-            meeting = meet_octant(tree, rays, at)
+            meeting = meet_octant(nodes, rays, at)
             if meeting != 0:
                 unresolved |= test_leaf(tree, rays, meeting, node, any_hit)
                 # rule: packet-limit

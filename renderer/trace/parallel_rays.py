@@ -31,7 +31,7 @@ from renderer.trace.best import NO_FACE, no_hit
 from renderer.trace.intersect import Shear, box_limit, largest_of, room_of, round_both
 from renderer.trace.layout import CACHE_LINE, CHILDREN, NODE_WORDS, UNUSED, cache_aligned
 from renderer.trace.leaf import nearest_in_blocks
-from renderer.trace.packet import Beam, enter_beam, highest_origin, lowest_origin, make_beam, meet_box, test_leaf
+from renderer.trace.packet import Beam, enter_beam, highest_origin, lowest_origin, make_beam, meet_octant, test_leaf
 from renderer.trace.ray_lanes import (
     BLOCK_ROW,
     CHILD,
@@ -240,7 +240,7 @@ def _test_list(tree, prepared, parallel, listed, beam):
         while bits != 0:
             octant = base + lowest_bit(bits)
             bits &= bits - 1
-            meeting = meet_box(parallel.nodes, octant, floats, 0) | (meet_box(parallel.nodes, octant, floats, 8) << 8)
+            meeting = meet_octant(parallel.nodes, prepared, octant)
             if meeting != 0:
                 leaf = np.int64(load(parallel.links, octant + CHILDREN))
                 unresolved |= test_leaf(tree, prepared, meeting, leaf, True)

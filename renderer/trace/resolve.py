@@ -12,6 +12,7 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import (
+    LEAST_NORMAL,
     as_pairs,
     cross_pairs,
     dot_pairs,
@@ -54,7 +55,6 @@ LINE = 2.0**-48
 _NEAR = 2.0**-48
 # What ``_height_sign`` says of an origin that is not near.
 _FAR = 3
-_LEAST_NORMAL = 2.0**-1022
 # What a place along the longest side errs by at most, as a share of it and of the distance: eight roundings.
 _SLACK = 2.0**-50
 
@@ -113,7 +113,7 @@ def _height_sign(tree, at, ray):
 
 
 @kernel
-def _scaled_normal(tree, at, ray):
+def _scaled_normal(tree, at):
     """The normal of a face as pairs, its sides scaled by a power of two."""
     p0, p1, p2 = corners_at(tree, at)
     side = maximum(largest_component(sub(p1, p0)), largest_component(sub(p2, p0)))
@@ -146,8 +146,8 @@ def _exact_t(tree, at, ray):
     """Where a ray meets the plane of a face, with twice the digits."""
     (p0, _, _), o, (d, d_unit) = corners_at(tree, at), _origin(ray), _direction(ray)
     way = sub(p0, o)
-    unit = power_below(maximum(largest_component(way), _LEAST_NORMAL))
-    normal = _scaled_normal(tree, at, ray)
+    unit = power_below(maximum(largest_component(way), LEAST_NORMAL))
+    normal = _scaled_normal(tree, at)
     height = dot_pairs(normal, scaled_difference(p0, o, 1.0 / unit))
     return quotient(height, dot_pairs(normal, as_pairs(d)))[0] * unit / d_unit
 

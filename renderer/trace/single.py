@@ -9,8 +9,8 @@ from renderer.trace.intersect import largest_of, make_shear
 from renderer.trace.leaf import nearest_carefully, tree_pointers
 from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers, write_hit
 from renderer.trace.single_ray import Found, enter_counted, prepare_single
-from renderer.trace.starts.record import EDGE, PILE
-from renderer.trace.starts.search import NEAR_HIT, search_from, t_from
+from renderer.trace.starts.record import PILE
+from renderer.trace.starts.search import is_near_start, search_from, t_from
 from renderer.trace.walk import stack_size, walk
 
 # The levels of the deepest tree whose stack fits into a kernel's own frame.
@@ -52,7 +52,7 @@ def write_best(tree, rays, found, i, best, slack, largest, dz, any_hit):
     ``slack`` is the ray's, ``largest`` the largest component of its direction: where the hit is near, the way that its
     origin was moved is a part of t.
     """
-    if not any_hit and 0.0 < slack < EDGE and best.t * largest < NEAR_HIT * slack:
+    if not any_hit and is_near_start(slack, best.t * largest):
         best = count_from_start(tree, rays, i, best)
     write_hit(found, i, rays.scale, best, dz, any_hit)
     if slack > 0.0 and not any_hit and best.t == 0.0 and is_negative(best.t):
@@ -70,9 +70,10 @@ def count_from_start(tree, rays, i, best):
 
 @kernel
 def trace_few(descriptor, rays, out, holders):
-    """Closest hits of a few rays, one by one, into the rows t, u, v, face and side of ``out``.
+    """Closest hits of a few rays, one by one, into the rows of ``out``, see ``hit_pointers``.
 
-    Bounds and return value are those of ``trace_chunk``. The tree has at most FEW_DEPTH levels.
+    Returns the row of the first ray out of range, for which nothing is traced, or -1. The tree has at most FEW_DEPTH
+    levels.
     """
     tree, count = tree_pointers(descriptor), out.shape[1]
     source, found = ray_pointers(rays, tree.scale), hit_pointers(out, count)

@@ -17,6 +17,7 @@ from renderer.numerics.vec3 import (
     dot,
     largest_component,
     largest_of_three,
+    least_axis,
     normalized,
     row3,
     scale,
@@ -144,17 +145,9 @@ def _normal_of_line(p0, p1, p2, d):
     across = normalized(sub(scale(longest, dot(d, longest)), d))
     if largest_component(across) == 0.0:
         # Of a d along the side every direction across looks as far back.
-        across = normalized(cross(longest, _least_axis(longest)))
+        across = normalized(cross(longest, least_axis(longest)))
     # Once more, because of a d nearly along the side rounding leaves much of what points along it.
     return normalized(sub(across, scale(longest, dot(across, longest))))
-
-
-@inlined
-def _least_axis(a):
-    """The axis along which a vector has its least component."""
-    x, y, z = abs(a[0]), abs(a[1]), abs(a[2])
-    on_x, on_y = x <= y and x <= z, y <= z
-    return (1.0 if on_x else 0.0), (0.0 if on_x or not on_y else 1.0), (0.0 if on_x or on_y else 1.0)
 
 
 @inlined
@@ -210,15 +203,15 @@ def _away(x, step, towards):
 
 
 @inlined
-def spawn_origin(p, error, n_g, w, offset):
+def spawn_origin(p, error, n_g, w, rule):
     """The start of a ray from the surface point p in direction w that does not meet that surface again.
 
-    By the rule ``offset``: moved along n_g by ``error``, the bound of ``offset_distance``, and rounded away; or as
+    By the ``OffsetRule``: moved along n_g by ``error``, the bound of ``offset_distance``, and rounded away; or as
     Mitsuba does, by its epsilon.
     """
     side = 1.0 if dot(n_g, w) >= 0.0 else -1.0
-    if not offset.uses_error_bound:
-        distance = (1.0 + largest_component(p)) * offset.epsilon
+    if not rule.uses_error_bound:
+        distance = (1.0 + largest_component(p)) * rule.epsilon
         return add(p, scale(n_g, side * distance))
     # rule: spawn-offset
     step = scale(n_g, side * error)
@@ -226,7 +219,7 @@ def spawn_origin(p, error, n_g, w, offset):
 
 
 @inlined
-def put_start(row, place, n_g, w, d, offset):
+def put_start(row, place, n_g, w, d, rule):
     """Write the row of ``starts.record`` for a ray in direction w from a ``Place``, where one of direction d came. It
     is on the side of the face that it leads to: where that is not the one that the ray before it came from, it has gone
     through the face.
@@ -235,8 +228,8 @@ def put_start(row, place, n_g, w, d, offset):
     side = 1.0 if slope >= 0.0 else -1.0
     code = KNOWN | BARYCENTRIC | (ABOVE if side > 0.0 else 0) | (THROUGH if side != place.came else BACK)
     slack = place.slack if abs(slope) > LEVEL * largest_component(w) else EDGE
-    store(row, SLACK, slack if offset.uses_error_bound else 0.0)
-    store(row, FACE, place.face if offset.uses_error_bound else -1.0)
+    store(row, SLACK, slack if rule.uses_error_bound else 0.0)
+    store(row, FACE, place.face if rule.uses_error_bound else -1.0)
     store(row, CODE, np.float64(code))
     store(row, ANCHOR, place.u)
     store(row, ANCHOR + 1, place.v)
@@ -358,7 +351,7 @@ def _lies_far(corners, o, unit):
 
 @inlined
 def _lies_at(corners, weights, o, unit):
-    """Whether a point is where the barycentrics of a face say, as near as ``lies_far`` wants it."""
+    """Whether a point is where the barycentrics of a face say, as near as ``_lies_far`` wants it."""
     p0, p1, p2 = corners
     most = largest_of_three(p0, p1, p2)
     place = barycentric(p0, p1, p2, weights[0], weights[1])

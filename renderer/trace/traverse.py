@@ -214,7 +214,7 @@ def _hand_over(tree, query, top, unresolved):
     for k in range(top):
         entry = load(scratch.packet_stack, k)
         child, at_ = child_of(tree, octant_of(entry))
-        meeting = meet_octant(tree, prepared, at_)
+        meeting = meet_octant(tree.nodes, prepared, at_)
         while meeting != 0:
             wait_octant(prepared, lanes, lowest_bit(meeting), entry, child)
             meeting &= meeting - 1
@@ -294,8 +294,17 @@ def _trace_on(tree, query, progress, end):
 
 
 @kernel
+def trace_rays(tree, rays, found, count, scratch, any_hit):
+    """``trace`` of the first ``count`` rays, or ``search_blocks`` where the tree has no nodes."""
+    if tree.has_nodes:
+        trace(tree, rays, found, 0, count, scratch, any_hit)
+    else:
+        search_blocks(tree, rays, found, 0, count, scratch.holders, any_hit)
+
+
+@kernel
 def trace_chunk(descriptor, rays, out, progress, end, any_hit, scratch):
-    """Hits of rays up to ``end`` into ``out``: rows t, u, v, face and side, or with ``any_hit`` bools.
+    """Hits of rays up to ``end`` into ``out``: the rows of ``hit_pointers``, or with ``any_hit`` bools.
 
     ``descriptor`` is the tree's, which must have nodes. ``progress`` is (begin, 0, 0) in the first call for a chunk,
     and later what the last one returned first, with the same scratch: it ends early where much was to do, and all is

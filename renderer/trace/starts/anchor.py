@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import (
+    LEAST_NORMAL,
     cross_pairs,
     dot_pairs,
     exact_sum,
@@ -22,7 +23,6 @@ from renderer.numerics.simd import maximum
 from renderer.numerics.vec3 import largest_component, largest_of_three, sub
 from renderer.trace.starts.record import BARYCENTRIC
 
-_LEAST_NORMAL = 2.0**-1022
 _ZERO = (0.0, 0.0)
 # A point of a face as near to an edge, as a share of the size of the face, is on it: pairs err by 2^-98 of four
 # factors.
@@ -51,7 +51,7 @@ def anchor_of(start):
     """
     p0, p1, p2 = corners = start.corners
     side = largest_of_three(sub(p1, p0), sub(p2, p1), sub(p0, p2))
-    unit = power_below(maximum(side, _LEAST_NORMAL))
+    unit = power_below(maximum(side, LEAST_NORMAL))
     if start.code & BARYCENTRIC != 0:
         return _at_weights(corners, start.anchor[0], start.anchor[1], unit)
     return _nearest(corners, start.anchor, unit)
@@ -94,26 +94,27 @@ def _sum(a, b):
 
 
 @inlined
-def _corner(corners, k):
-    return corners[0] if k == 0 else (corners[1] if k == 1 else corners[2])
+def one_of(three, k):
+    """The k-th of three things of one type, which Numba cannot index by a variable."""
+    return three[0] if k == 0 else (three[1] if k == 1 else three[2])
 
 
 @inlined
-def _at_corner(corners, k, unit):
-    return Anchor(_corner(corners, k), (_ZERO, _ZERO, _ZERO), unit, corners, 7 & ~(1 << k))
+def _atone_of(corners, k, unit):
+    return Anchor(one_of(corners, k), (_ZERO, _ZERO, _ZERO), unit, corners, 7 & ~(1 << k))
 
 
 @kernel
 def _along(corners, i, j, share, unit):
     """The point of the side from corner i to corner j, ``share`` of it from i; at its ends the corner itself."""
     if share[0] <= _TINY:
-        return _at_corner(corners, i, unit)
+        return _atone_of(corners, i, unit)
     rest = minus((1.0, 0.0), share)
     if rest[0] <= _TINY:
-        return _at_corner(corners, j, unit)
+        return _atone_of(corners, j, unit)
     if share[0] > 0.5:
         i, j, share = j, i, rest
-    a, b = _corner(corners, i), _corner(corners, j)
+    a, b = one_of(corners, i), one_of(corners, j)
     return Anchor(a, _times(scaled_difference(b, a, 1.0 / unit), share), unit, corners, 7 & ~((1 << i) | (1 << j)))
 
 
@@ -155,11 +156,11 @@ def _nearest(corners, o, unit):
     d3, d4, d5, d6 = minus(d1, aa), minus(d2, ab), minus(d1, ab), minus(d2, bb)
     rise, fall = minus(d4, d3), minus(d5, d6)
     if d1[0] <= 0.0 and d2[0] <= 0.0:
-        return _at_corner(corners, 0, unit)
+        return _atone_of(corners, 0, unit)
     if d3[0] >= 0.0 and rise[0] <= 0.0:
-        return _at_corner(corners, 1, unit)
+        return _atone_of(corners, 1, unit)
     if d6[0] >= 0.0 and fall[0] <= 0.0:
-        return _at_corner(corners, 2, unit)
+        return _atone_of(corners, 2, unit)
     # Two corners at one place have no side between them.
     if aa[0] > 0.0 and _is_beyond(d3, d2, d1, d4) and d1[0] >= 0.0 and d3[0] <= 0.0:
         return _along(corners, 0, 1, quotient(d1, aa), unit)

@@ -67,7 +67,7 @@ def put_node(holders, k, word, value):
 
 
 @kernel
-def add_holder(tree, holders, count, place, face, zeros):
+def add_holder(holders, count, place, face, zeros):
     """Add a face to the holders, unless there is no room; returns their number."""
     if count >= MOST_HOLDERS:
         return count

@@ -9,7 +9,7 @@ import numpy as np
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import heads
 from renderer.numerics.simd import load, offset, store
-from renderer.numerics.vec3 import cross, dot, largest_component, normalized, three
+from renderer.numerics.vec3 import cross, dot, largest_component, normalized, put3, three
 from renderer.trace.starts.cone import (
     FIRST_NODE,
     FREE_PATH,
@@ -58,13 +58,6 @@ def has_fan(table):
     return load(table, _COUNT) > 0.0
 
 
-@inlined
-def _put3(base, first, a):
-    store(base, first, a[0])
-    store(base, first + 1, a[1])
-    store(base, first + 2, a[2])
-
-
 @kernel
 def write_fan(tree, anchor, holders, count, nodes, k, side, table, room):
     """Write the table of a start in the region beside the k-th of its holders, on one side of it, if there are ``room``
@@ -92,12 +85,12 @@ def _write_rows(tree, anchor, holders, count, hub, table):
         first, second = cross(n, normalized(heads(cone.first))), cross(n, normalized(heads(cone.second)))
         if abs(dot(n, hub)) < _LEAST:
             return False
-        _put3(row, _NORMAL, n)
-        _put3(row, _FIRST, first if cone.kind > 0 else (0.0, 0.0, 0.0))
-        _put3(row, _SECOND, second if cone.kind > 1 else (0.0, 0.0, 0.0))
+        put3(row, _NORMAL, n)
+        put3(row, _FIRST, first if cone.kind > 0 else (0.0, 0.0, 0.0))
+        put3(row, _SECOND, second if cone.kind > 1 else (0.0, 0.0, 0.0))
         # What has no outline holds every place of its plane.
         products = dot(n, hub), dot(first, hub) if cone.kind > 0 else 1.0, dot(second, hub) if cone.kind > 1 else -1.0
-        _put3(row, _HUB, products)
+        put3(row, _HUB, products)
         store(row, _PATH, np.float64(holder(holders, j, PATH)))
         store(row, _NODES, np.float64(holder(holders, j, FIRST_NODE)))
         store(row, _NODES + 1, np.float64(holder(holders, j, SECOND_NODE)))

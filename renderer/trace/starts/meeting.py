@@ -11,6 +11,7 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import (
+    LEAST_NORMAL,
     as_pairs,
     cross_pairs,
     dot_pairs,
@@ -23,14 +24,13 @@ from renderer.numerics.predicates import UNDECIDED, slope_sign, volume_sign
 from renderer.numerics.simd import local_doubles, maximum
 from renderer.numerics.vec3 import largest_component, largest_of_three, scale, sub
 from renderer.trace.edge_signs import corners_at
-from renderer.trace.starts.anchor import from_anchor
+from renderer.trace.starts.anchor import from_anchor, one_of
 
 MISSES, IS_HIT, HOLDS = 0, 1, 2
 NONE = -1
 # A product of three vectors errs by less than 2^-94 of the products of their largest components, and the way to a
 # corner by 2^-100 of what it is the difference of.
 _ERROR, _WAY_ERROR = 2.0**-94, 2.0**-98
-_LEAST_NORMAL = 2.0**-1022
 
 
 class SeenFace(NamedTuple):
@@ -89,7 +89,7 @@ def seen_from(tree, place, anchor):
     p0, p1, p2 = corners_at(tree, place)
     o = anchor.base
     reach = largest_of_three(sub(p0, o), sub(p1, o), sub(p2, o))
-    factor = 1.0 / power_below(maximum(reach, _LEAST_NORMAL))
+    factor = 1.0 / power_below(maximum(reach, LEAST_NORMAL))
     one, other = scaled_difference(p1, p0, factor), scaled_difference(p2, p0, factor)
     sides = largest_component(heads(one)) * largest_component(heads(other))
     return SeenFace(
@@ -127,12 +127,7 @@ def _way(face, k):
 def _error_of(face, i, j):
     """The error of the vector product of the ways to two corners."""
     a, b = _size(_way(face, i)), _size(_way(face, j))
-    return a * b * _ERROR + a * _chosen(face.errors, j) + b * _chosen(face.errors, i)
-
-
-@inlined
-def _chosen(three, k):
-    return three[0] if k == 0 else (three[1] if k == 1 else three[2])
+    return a * b * _ERROR + a * one_of(face.errors, j) + b * one_of(face.errors, i)
 
 
 @kernel

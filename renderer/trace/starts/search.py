@@ -66,7 +66,7 @@ AHEAD = -0.0
 # The least t of a face that does not hold the start: what is less would be 0 in the mesh's own units.
 _LEAST_T = 2.0**-900
 # A hit that is farther than so often its slack errs by less than 2^-20 of t by where the ray starts.
-NEAR_HIT = 2.0**20
+_NEAR_HIT = 2.0**20
 
 
 @inlined
@@ -119,7 +119,7 @@ def _add_holders(tree, query, first, blocks, count):
             if face >= 0 and _box_holds(tree, place, query.o):
                 met = meet_face(seen_from(tree, place, query.anchor), query.anchor, query.d, query.slope, query.dz)
                 if met.kind == HOLDS:
-                    count = add_holder(tree, query.holders, count, place, face, met.zeros)
+                    count = add_holder(query.holders, count, place, face, met.zeros)
     return count, False
 
 
@@ -276,11 +276,15 @@ def t_from(tree, starts, i, ray, face, t):
 
 
 @inlined
+def is_near_start(slack, distance):
+    """Whether a hit is so near that the way that its ray's origin was moved is a part of t."""
+    return 0.0 < slack < EDGE and distance <= _NEAR_HIT * slack
+
+
+@inlined
 def counted_from_start(tree, starts, i, ray, largest, hit, face):
-    """A ``FaceHit`` with t counted from the exact start of ray ``i``: where it is near, the way that the origin
-    was moved is a part of t.
-    """
-    if 0.0 < ray.slack < EDGE and hit.t * largest <= NEAR_HIT * ray.slack:
+    """A ``FaceHit`` with t counted from the exact start of ray ``i``."""
+    if is_near_start(ray.slack, hit.t * largest):
         return FaceHit(t_from(tree, starts, i, ray, face, hit.t), hit.u, hit.v, hit.w)
     return hit
 
