@@ -11,14 +11,12 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE), str(HERE.parent)]  # docstrings.py, and the tree itself whatever is installed
+sys.path[:0] = [str(HERE), str(HERE.parent)]  # the modules here, and the tree itself whatever is installed
 os.environ.setdefault("OCTREE_RENDERER_QUIET", "1")
 
 import downloads  # noqa: E402
 from api_links import link_api  # noqa: E402
 from case_links import link_cases  # noqa: E402
-from docstrings import as_rst  # noqa: E402
-from figures import tiles  # noqa: E402
 from source_links import link_sources, source_pages  # noqa: E402
 from sphinx.util.logging import getLogger  # noqa: E402
 
@@ -92,12 +90,6 @@ def short_types(app, what, name, thing, options, signature, returns):
     return short, returns
 
 
-def put_figures(app, page, source):
-    """The start page has the README's figures."""
-    if page == "docs/index":
-        source[0] = source[0].replace("FIGURES", tiles((HERE.parent / "README.md").read_text(encoding="utf-8")))
-
-
 def put_downloads(app, page, source):
     """The page of downloads has the files that are built now."""
     if page == "docs/downloads":
@@ -119,8 +111,7 @@ def unpack_samples(app, failed):
 
 
 def setup(app):
-    """Let autodoc read this project's docstrings, and add what is made at build."""
-    app.connect("source-read", put_figures)
+    """Add what is made at build."""
     app.connect("source-read", put_downloads)
     app.connect("env-get-outdated", lambda app, env, added, changed, removed: ["docs/downloads"])
     app.connect("doctree-resolved", link_api)
@@ -129,4 +120,3 @@ def setup(app):
     app.connect("html-collect-pages", source_pages)
     app.connect("build-finished", unpack_samples)
     app.connect("autodoc-process-signature", short_types)
-    app.connect("autodoc-process-docstring", lambda app, what, name, thing, options, lines: as_rst(lines), priority=100)

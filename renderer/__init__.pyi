@@ -1,3 +1,4 @@
+from . import shapes as shapes
 from .errors import MeshError as MeshError
 from .errors import SceneError as SceneError
 from .mesh.load import load_mesh as load_mesh
@@ -18,6 +19,7 @@ from .results.hits import Hits as Hits
 from .results.steps import Steps as Steps
 from .scene.camera import OrthographicCamera as OrthographicCamera
 from .scene.camera import PerspectiveCamera as PerspectiveCamera
+from .scene.fields import SceneWarning as SceneWarning
 from .scene.light import DirectionalLight as DirectionalLight
 from .scene.light import PointLight as PointLight
 from .scene.material import Dielectric as Dielectric

@@ -3,10 +3,15 @@
 All of them are ``ValueError``s, so a caller can catch them as one; the command line turns each into one line.
 """
 
+import difflib
+from collections.abc import Iterable
+
 
 class MeshError(ValueError):
-    """A mesh file or mesh arrays that cannot be used; names the file or argument and the fault.
+    """The error for a mesh file or mesh arrays that cannot be used. It names the file or argument and the fault.
 
+    Examples
+    --------
     >>> from renderer import Mesh
     >>> Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 9]])
     Traceback (most recent call last):
@@ -16,8 +21,10 @@ class MeshError(ValueError):
 
 
 class SceneError(ValueError):
-    """A scene that cannot be used; names the file, the key's path, the value that was expected and the one given.
+    """The error for a scene that cannot be used. It names the file, the key, the expected value and the given one.
 
+    Examples
+    --------
     >>> from renderer import PerspectiveCamera
     >>> PerspectiveCamera(eye=(0, 0, 1), target=(0, 0, 0), fov=180)
     Traceback (most recent call last):
@@ -26,10 +33,34 @@ class SceneError(ValueError):
     """
 
 
+# A file that is not there is both bad input of this package and what Python's own functions raise.
+
+
+class NoSuchFileError(FileNotFoundError, ValueError):
+    """A file that is not there."""
+
+
+class NoSuchMeshError(NoSuchFileError, MeshError):
+    """A mesh file that is not there."""
+
+
+class NoSuchSceneError(NoSuchFileError, SceneError):
+    """A scene file that is not there."""
+
+
 def expect(condition: bool, argument: str, expected: str, got: object) -> None:
     """Raise ``ValueError`` naming ``argument``, what was expected and what was given, unless ``condition``."""
     if not condition:
         raise ValueError(f"{argument}: expected {expected}, got {got}")
+
+
+def expect_known(argument: str, name: object, known: Iterable[str]) -> None:
+    """Raise ``ValueError`` unless ``name`` is one of ``known``; the message has them, and the most similar one."""
+    names = list(known)
+    if name not in names:
+        like = difflib.get_close_matches(str(name), names, 1)
+        hint = f". Did you mean {like[0]!r}?" if like else ""
+        raise ValueError(f"{argument}: expected one of {', '.join(names)}, got {name!r}{hint}")
 
 
 def extra_hint(name: str) -> str:

@@ -6,13 +6,14 @@ import sys
 from collections.abc import Callable
 from importlib import import_module
 
-_LINE = re.compile(r"^from (\.[\w.]+) import (\w+) as \2$", re.MULTILINE)
+_LINE = re.compile(r"^from (\.[\w.]*) import (\w+) as \2$", re.MULTILINE)
 
 
 def attach_stub(package: str) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
     """``__getattr__``, ``__dir__`` and ``__all__`` of a package by its ``__init__.pyi``, which type checkers read.
 
-    The stub has a line ``from .module import name as name`` for each public name. Unlike ``lazy_loader.attach_stub``
+    The stub has a line ``from .module import name as name`` for each public name, and ``from . import name as name``
+    for a module. Unlike ``lazy_loader.attach_stub``
     this finds it in a zip file too.
     """
     stub = pkgutil.get_data(package, "__init__.pyi")
@@ -23,7 +24,8 @@ def attach_stub(package: str) -> tuple[Callable[[str], object], Callable[[], lis
     def find(name: str) -> object:
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        value = getattr(import_module(homes[name], package), name)
+        home = homes[name]
+        value = import_module(f".{name}", package) if home == "." else getattr(import_module(home, package), name)
         setattr(sys.modules[package], name, value)
         return value
 

@@ -1,16 +1,21 @@
 """The public accelerators: ``Octree``, and ``BruteForce`` as its baseline with the same interface and triangle test."""
 
+from __future__ import annotations  # so that help() shows ArrayLike by its name
+
 import os
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from renderer.arguments.arrays import flag_argument
 from renderer.arguments.counts import count_argument
+from renderer.arguments.types import ArrayLike
 from renderer.errors import MeshError, expect
-from renderer.mesh.mesh import Mesh, Repairs
+from renderer.mesh.foreign import TriangleMesh, has_triangles
+from renderer.mesh.load import load_mesh
+from renderer.mesh.mesh import Mesh, Repairs, foreign_arrays
 from renderer.queryable import Built, Queries
 from renderer.system.threads import checked_threads
 from renderer.trace.layout import BLOCK_FACES, CHILDREN, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
@@ -33,16 +38,29 @@ _ROWS = 1 << 16
 
 @dataclass(frozen=True)
 class Stats:
-    """Counts of a built tree. ``references`` counts the faces in all leaves; each face is in exactly one.
+    """Counts of a built tree.
 
-    ``cost`` is what the surface area heuristic expects of a line that crosses the mesh's bounds and is stopped by
-    nothing: the number of nodes that it enters plus the number of blocks that it tests, each counted as its box's share
-    of the root's area. It compares trees of one mesh, such as before and after a refit: the time per ray grows about as
-    it does.
+    Attributes
+    ----------
+    faces, nodes, leaves : int
+        Numbers of faces, inner nodes and leaves.
+    depth : int
+        The number of levels.
+    blocks : int
+        Blocks of four triangles.
+    references : int
+        Faces in all leaves; each face is in exactly one.
+    bytes : int
+        Memory of the tree, without the mesh.
+    cost : float
+        The nodes entered and blocks tested that the surface area heuristic expects of a line through the bounds. It
+        compares trees of one mesh, as before and after a refit: the time per ray grows about as it does.
 
+    Examples
+    --------
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box
-    >>> stats = Octree.from_mesh(box()).stats
+    >>> stats = Octree(box()).stats
     >>> stats.faces, stats.references, stats.depth
     (12, 12, 1)
     """
@@ -58,11 +76,13 @@ class Stats:
 
     @property
     def fill(self) -> float:
-        """The share of the blocks' places that hold a face; 1 where there is no block.
+        """The share of the blocks' places that hold a face; 1 without blocks.
 
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
-        >>> Octree.from_mesh(box()).stats.fill
+        >>> Octree(box()).stats.fill
         0.6
         """
         return self.references / (self.blocks * BLOCK_FACES) if self.blocks else 1.0
@@ -72,16 +92,24 @@ class _Accelerator(Queries):
     """A built mesh, which can be refitted and counted."""
 
     def refit(self, vertices: ArrayLike) -> None:
-        """Move the vertices and keep the faces: ``vertices`` is (V, 3), finite, V as built.
+        """Move the vertices and keep the faces, in a fraction of the time of a build.
 
-        Hits are from then on, bit for bit, those of a new build over the moved mesh. Only boxes and blocks are made
-        anew, which takes a fraction of a build. Faces that share a leaf still do, so rays slow down when neighbours
-        move apart, about as ``stats.cost`` grows: build anew where that is too much. Normals, colours and texture
-        coordinates of ``mesh`` stay as they are.
+        Hits are then bit for bit those of a new build. Rays slow down where faces of one leaf move apart, about as
+        ``stats.cost`` grows; build anew where that is too much. Normals, colours, texture coordinates and parts of
+        ``mesh`` stay. A query that runs meanwhile sees the mesh before or after. ``Hits`` keep the mesh that they hit.
 
-        A query that runs meanwhile sees the mesh before or after, never a mixture; ``Hits`` keep the mesh that they
-        hit. Raises ``MeshError``, and changes nothing, where ``vertices`` cannot replace those of the mesh.
+        Parameters
+        ----------
+        vertices : array_like, shape (V, 3)
+            Finite, and as many as before.
 
+        Raises
+        ------
+        MeshError
+            For other arrays; nothing is changed then.
+
+        Examples
+        --------
         >>> from renderer import Octree
         >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
         >>> octree.refit([[0, 0, 1], [1, 0, 1], [0, 1, 1]])
@@ -100,11 +128,13 @@ class _Accelerator(Queries):
 
     @property
     def stats(self) -> Stats:
-        """Counts and bytes of the built arrays, those of the mesh left out.
+        """Counts of the tree: faces, nodes, leaves, depth, blocks, bytes and cost.
 
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
-        >>> stats = Octree.from_mesh(box(), leaf_size=2).stats
+        >>> stats = Octree(box(), leaf_size=2).stats
         >>> stats.nodes, stats.leaves, stats.blocks
         (1, 6, 6)
         """
@@ -123,25 +153,61 @@ class _Accelerator(Queries):
 
 
 class Octree(_Accelerator):
-    """An octree over triangles with fitted boxes, eight octants tested at once and blocks of four triangles.
+    """An octree over a triangle mesh, for ray, inside and distance queries.
 
-    split      "midpoint": octants about the middle of each box, not cut across axes less than half as long as the
-               longest, and the surface area heuristic for the last few faces; "sah": that heuristic throughout, slower
-               to build, with fewer steps for rays among flat walls
-    leaf_size  the most faces of a leaf, 1 to 32; one of more than four only where that is the cheaper
-    max_depth  the deepest level that the split rule may cut, 1 to 64; below it faces are shared out evenly
-    threads    for the build and queries; None takes all processors; results do not depend on it
-    repair     build without the faces that name a vertex that is not finite or an index out of range, which are errors
-               otherwise. A hit's ``face`` is then one of ``octree.mesh``, the faces that were kept; ``octree.repairs``
-               (None without this option) tells what was dropped, and ``repairs.kept_faces[hits.face[hits.hit]]``
-               gives the rows of the given ``faces``
+    ``Octree(mesh)`` takes a ``Mesh``, the path of a mesh file, or an object with ``vertices`` and ``faces``, such as a
+    ``trimesh.Trimesh``. ``Octree(vertices, faces)`` takes arrays.
 
+    Parameters
+    ----------
+    vertices : Mesh, str, path, trimesh.Trimesh, or array_like of shape (V, 3)
+        The mesh, or its vertices if ``faces`` is given.
+    faces : array_like of int, shape (F, 3), optional
+        Vertex numbers, counter-clockwise seen from outside.
+    split : {"midpoint", "sah"}, default "midpoint"
+        Where boxes are cut: in the middle, or by the surface area heuristic. The second takes longer to build and saves
+        steps where rays run among flat walls.
+    leaf_size : int, default 4
+        The most faces of a leaf, 1 to 32. Leaves of more than four are made only where they cost less.
+    max_depth : int, default 32
+        The deepest level that ``split`` may cut, 1 to 64. Below it faces are shared out evenly.
+    threads : int, optional
+        Threads of the build and of queries; None for all processors. Results do not depend on it.
+    repair : bool, default False
+        Leave out faces that name a missing vertex or one that is not finite, which are errors otherwise. ``face`` of a
+        hit then counts the faces of ``octree.mesh``, and ``octree.repairs`` says what was left out. For a file, a
+        ``RepairWarning`` says it.
+
+    Raises
+    ------
+    MeshError
+        For a mesh that cannot be used. The message names the array or file and the fault.
+    FileNotFoundError
+        If there is no such file. The error is a ``MeshError`` too.
+
+    Examples
+    --------
     >>> from renderer import Octree
     >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     >>> octree.closest_hit([[0.25, 0.25, 2.0]], [[0, 0, -1]]).t
     array([2.])
+    >>> Octree("scenes/models/torus_knot.ply")
+    <Octree over 40,000 faces, depth 7>
     """
 
+    @overload
+    def __init__(
+        self,
+        vertices: Mesh | str | os.PathLike[str] | TriangleMesh,
+        faces: None = None,
+        *,
+        split: Literal["midpoint", "sah"] = "midpoint",
+        leaf_size: int = 4,
+        max_depth: int = 32,
+        threads: int | None = None,
+        repair: bool = False,
+    ) -> None: ...
+    @overload
     def __init__(
         self,
         vertices: ArrayLike,
@@ -152,8 +218,19 @@ class Octree(_Accelerator):
         max_depth: int = 32,
         threads: int | None = None,
         repair: bool = False,
+    ) -> None: ...
+    def __init__(
+        self,
+        vertices: Mesh | str | os.PathLike[str] | TriangleMesh | ArrayLike,
+        faces: ArrayLike | None = None,
+        *,
+        split: Literal["midpoint", "sah"] = "midpoint",
+        leaf_size: int = 4,
+        max_depth: int = 32,
+        threads: int | None = None,
+        repair: bool = False,
     ) -> None:
-        mesh, repairs = _mesh(vertices, faces, repair)
+        mesh, repairs = as_mesh(vertices, faces, repair)
         self._build(mesh, split, leaf_size, max_depth, threads)
         self.repairs = repairs
 
@@ -166,9 +243,21 @@ class Octree(_Accelerator):
         leaf_size: int = 4,
         max_depth: int = 32,
         threads: int | None = None,
-    ) -> "Octree":
-        """Build over a mesh that is already checked; options as in the class.
+    ) -> Octree:
+        """Build over a ``Mesh``, as ``Octree(mesh)`` does.
 
+        Parameters
+        ----------
+        mesh : Mesh
+        split, leaf_size, max_depth, threads
+            As for ``Octree``.
+
+        Returns
+        -------
+        Octree
+
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import icosphere
         >>> octree = Octree.from_mesh(icosphere(3), split="sah", threads=1)
@@ -181,11 +270,28 @@ class Octree(_Accelerator):
         return octree
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write mesh, tree and ``repairs`` to one file, whole or not at all, for ``load``.
+        """Write mesh, tree and ``repairs`` to one file for ``Octree.load``.
 
-        ``renderer/tree/store.py`` describes the file; no suffix is expected. A refit that runs meanwhile is in it or
-        not. Raises ``OSError`` where it cannot be written, and ``ValueError`` for what is no path.
+        The file appears whole or not at all.
 
+        Parameters
+        ----------
+        path : str or path
+            Any file name.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written.
+        ValueError
+            For what is no path.
+
+        Notes
+        -----
+        ``renderer/tree/store.py`` describes the file.
+
+        Examples
+        --------
         >>> import tempfile
         >>> from renderer import Octree
         >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
@@ -199,20 +305,38 @@ class Octree(_Accelerator):
         save_octree(path, Stored(mesh, tree, self.repairs))
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str], *, mmap: bool = False, threads: int | None = None) -> "Octree":
-        """The octree that ``save`` wrote: the same bits from every query, in a fraction of the time of a build.
+    def load(cls, path: str | os.PathLike[str], *, mmap: bool = False, threads: int | None = None) -> Octree:
+        """Return the octree that ``Octree.save`` wrote, in a fraction of the time of a build.
 
-        mmap     False: read all, and check each array against its checksum. True: the arrays (V, 3), (F, 3) and the
-                 tree's are views of a read-only map of the file: nothing is copied, processes that map one file share
-                 its memory, and blocks of triangles, most of the file, are read when rays come to them. The checksums
-                 of arrays are not checked then, and the file must not be written to as long as the octree is used, or
-                 the process may crash; ``save`` over it is safe on POSIX, as it makes a new file
-        threads  for queries, as in the class
+        It gives the same bits, and can be refitted, pickled and saved again.
 
-        Either way the tree is checked so far that no content, damaged or forged, crashes a query; where no checksum
-        tells, it may give wrong hits. The octree can be refitted, pickled and saved again. Raises ``ValueError`` that
-        names the path: not there, not a file, no octree, of another version, truncated, damaged.
+        Parameters
+        ----------
+        path : str or path
+        mmap : bool, default False
+            Map the file instead of reading it: nothing is copied, processes share the memory, and blocks of triangles
+            are read when rays come to them. Checksums of arrays are not checked. The file must not be written to while
+            the octree is used; ``save`` over it is safe on POSIX, as it makes a new file.
+        threads : int, optional
+            Threads of queries; None for all processors.
 
+        Returns
+        -------
+        Octree
+
+        Raises
+        ------
+        FileNotFoundError
+            If there is no such file. The error is a ``ValueError`` too.
+        ValueError
+            For a file that is no octree, of another version, truncated or damaged. The message names the path.
+
+        Notes
+        -----
+        No content, damaged or forged, crashes a query. Where no checksum is checked, it may give wrong hits.
+
+        Examples
+        --------
         >>> import tempfile
         >>> from renderer import Octree
         >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
@@ -242,29 +366,64 @@ class Octree(_Accelerator):
 
 
 class BruteForce(_Accelerator):
-    """Every ray against every face, through the octree's own triangle test: the octree's baseline.
+    """Every ray against every face, by the octree's own triangle test: a baseline with the queries of ``Octree``.
 
-    ``threads`` and ``repair`` as for ``Octree``.
+    Parameters
+    ----------
+    vertices, faces, threads, repair
+        As for ``Octree``.
 
+    Examples
+    --------
     >>> from renderer import BruteForce, Octree
     >>> from renderer.mesh.shapes import icosphere
     >>> mesh, rays = icosphere(3), ([[0.1, 0.2, 3], [2, 2, 2]], [0, 0, -1])
-    >>> brute, octree = BruteForce(mesh.vertices, mesh.faces), Octree(mesh.vertices, mesh.faces)
+    >>> brute, octree = BruteForce(mesh), Octree(mesh)
     >>> bool((brute.closest_hit(*rays).t == octree.closest_hit(*rays).t).all())
     True
     """
 
+    @overload
+    def __init__(
+        self,
+        vertices: Mesh | str | os.PathLike[str] | TriangleMesh,
+        faces: None = None,
+        *,
+        threads: int | None = None,
+        repair: bool = False,
+    ) -> None: ...
+    @overload
     def __init__(
         self, vertices: ArrayLike, faces: ArrayLike, *, threads: int | None = None, repair: bool = False
+    ) -> None: ...
+    def __init__(
+        self,
+        vertices: Mesh | str | os.PathLike[str] | TriangleMesh | ArrayLike,
+        faces: ArrayLike | None = None,
+        *,
+        threads: int | None = None,
+        repair: bool = False,
     ) -> None:
-        mesh, repairs = _mesh(vertices, faces, repair)
+        mesh, repairs = as_mesh(vertices, faces, repair)
         super().__init__(mesh, _all_blocks(mesh, checked_threads(threads)), threads)
         self.repairs = repairs
 
     @classmethod
-    def from_mesh(cls, mesh: Mesh, *, threads: int | None = None) -> "BruteForce":
-        """The same over a mesh that is already checked.
+    def from_mesh(cls, mesh: Mesh, *, threads: int | None = None) -> BruteForce:
+        """Return the same over a ``Mesh``, as ``BruteForce(mesh)`` does.
 
+        Parameters
+        ----------
+        mesh : Mesh
+        threads : int, optional
+            As for ``Octree``.
+
+        Returns
+        -------
+        BruteForce
+
+        Examples
+        --------
         >>> from renderer import BruteForce
         >>> from renderer.mesh.shapes import box
         >>> BruteForce.from_mesh(box(), threads=1).any_hit([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1])
@@ -276,17 +435,43 @@ class BruteForce(_Accelerator):
         return brute
 
 
-def _mesh(vertices: ArrayLike, faces: ArrayLike, repair: bool) -> tuple[Mesh, Repairs | None]:
+def as_mesh(given: Any, faces: ArrayLike | None, repair: bool) -> tuple[Mesh, Repairs | None]:
+    """The mesh that the first arguments of ``Octree`` stand for, and its repairs, None without ``repair``.
+
+    Raises ``MeshError`` naming the argument.
+    """
     expect(isinstance(repair, bool), "repair", "True or False", repr(repair))
+    if isinstance(given, str | os.PathLike) and faces is None:
+        return load_mesh(given, repair=repair), None
+    if isinstance(given, Mesh) and faces is None:
+        mesh = _checked_mesh(given)  # nothing in it needs repair
+        return mesh, Mesh.repaired(mesh.vertices, mesh.faces)[1] if repair else None
+    attributes: dict[str, Any] = {}
+    if has_triangles(given):
+        if faces is not None:
+            raise MeshError(f"faces: expected none beside a mesh, got {type(faces).__name__}")
+        given, faces, attributes = foreign_arrays(given)
+    elif faces is None:
+        _refuse(given)
     if repair:
-        return Mesh.repaired(vertices, faces)
-    return Mesh(vertices, faces), None
+        return Mesh.repaired(given, faces, **attributes)  # type: ignore[arg-type]
+    return Mesh(given, faces, **attributes), None  # type: ignore[arg-type]
+
+
+def _refuse(given: object) -> None:
+    """Raise the error for one argument that is neither a mesh nor a path."""
+    if isinstance(given, list | tuple) or hasattr(given, "__array__") or hasattr(given, "__dlpack__"):
+        raise MeshError("faces: expected integers of shape (F, 3) beside vertices, got None")
+    hint = "; scene.to_mesh() makes one of a scene" if hasattr(given, "to_mesh") else ""
+    raise MeshError(
+        "mesh: expected a Mesh, a path, an object with vertices and faces such as a trimesh.Trimesh, or vertices and "
+        f"faces, got {type(given).__module__}.{type(given).__name__}{hint}"
+    )
 
 
 def _checked_mesh(mesh: Mesh) -> Mesh:
     """``mesh``, checked again if its arrays have been made writable since it was."""
-    arrays = hasattr(mesh, "vertices") and hasattr(mesh, "faces")  # as a trimesh.Trimesh, or Open3D's mesh, has them
-    hint = ", whose arrays Octree(mesh.vertices, mesh.faces) takes" if arrays else ""
+    hint = "; Octree(mesh) takes it" if has_triangles(mesh) else ""
     expect(isinstance(mesh, Mesh), "mesh", "a renderer.Mesh", f"{type(mesh).__module__}.{type(mesh).__name__}{hint}")
     return replace(mesh) if mesh.vertices.flags.writeable or mesh.faces.flags.writeable else mesh
 

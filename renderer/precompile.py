@@ -1,6 +1,6 @@
-"""Kernels compiled ahead, for CI, container images and copied folders; and, for a first picture, in two processes.
+"""Compiles kernels ahead, for CI, container images and copied folders; and in two processes before a first picture.
 
-Numba compiles in one thread of a process only, so a second process halves the wait.
+Numba compiles in only one thread of a process, so a second process halves the wait.
 """
 
 import os
@@ -45,7 +45,7 @@ _GLASS = Dielectric(type="dielectric", ior=1.5)
 
 
 class Part(NamedTuple):
-    """Kernels that are called together: the name of their purpose, and a function that calls them."""
+    """Kernels with a common purpose: its name, and a function that calls them."""
 
     name: str
     call: Callable[[], object]
@@ -156,7 +156,7 @@ PARTS: dict[str, tuple[Part, ...]] = {
 
 
 def compile_ahead(what: str = "all", began: Callable[[str], object] = lambda name: None) -> None:
-    """Compile the kernels of ``PARTS[what]``, or load those that were compiled before.
+    """Compile the kernels of ``PARTS[what]``, or load them if they are on disk.
 
     ``began(name)`` is called before each part.
     """
@@ -167,13 +167,13 @@ def compile_ahead(what: str = "all", began: Callable[[str], object] = lambda nam
 
 
 def compile_into(folder: Path) -> None:
-    """Let kernels compiled from now on be kept in ``folder`` alone, which no run writes but this one."""
+    """From now on keep compiled kernels only in ``folder``, to which no other run writes."""
     folder.mkdir(parents=True, exist_ok=True)
     kernel_store.keep_in(folder)
 
 
 def touch_viewing(prepared: PreparedScene) -> None:
-    """Compile or load the kernels that the viewer calls beside pictures; takes milliseconds if that was done before."""
+    """Compile or load the kernels that the viewer needs besides pictures; takes milliseconds if they are on disk."""
     eye, forward = prepared.scene.camera.eye, prepared.scene.camera.frame()[2]
     face_colors(prepared.arrays, eye)
     ray_path(prepared, eye, forward, 1)
@@ -184,8 +184,8 @@ def touch_viewing(prepared: PreparedScene) -> None:
 def compile_in_two() -> None:
     """Before a first picture: compile the kernels that build trees here and those that render in another process.
 
-    Does nothing where that was done before. Should the other process fail, its last line of output is logged, and its
-    kernels are compiled here when needed.
+    Does nothing if they are on disk. If the other process fails, its last line of output is logged, and its kernels are
+    compiled here when needed.
     """
     if is_on_disk(render_tile) or available_threads() < 2:
         return
@@ -214,7 +214,8 @@ def compile_in_two() -> None:
 def compile_picture() -> None:
     """Compile the kernels that render; no tree is built for it.
 
-    To be called in a process of its own only: it ends the process when standard input ends, as when the parent is gone.
+    Call it only in a process of its own: it ends the process when standard input ends, for instance because the parent
+    is gone.
     """
     Thread(target=_end_with_input, daemon=True).start()
     _render()
@@ -227,7 +228,7 @@ def _end_with_input() -> None:
 
 
 def _scene(material: Material) -> Scene:
-    """One triangle before the eye; of glass, every kind of ray may come up."""
+    """One triangle before the eye; for glass, every kind of ray may occur."""
     return Scene(
         camera=PerspectiveCamera(type="perspective", eye=(0.1, 0.1, 1.0), target=(0.1, 0.1, 0.0)),
         materials={"its": material},

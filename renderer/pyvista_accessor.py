@@ -1,4 +1,4 @@
-"""``mesh.octree`` of every ``pyvista.PolyData``: its questions answered by an ``Octree`` of the mesh.
+"""``mesh.octree`` of every ``pyvista.PolyData``: queries by an ``Octree`` of the mesh.
 
 PyVista, from 0.48 on, finds this module by the entry point ``pyvista.accessors``, so a script need not import it.
 """
@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyvista
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 
 if TYPE_CHECKING:
@@ -24,11 +25,13 @@ if not hasattr(pyvista, "register_dataset_accessor"):
 
 @pyvista.register_dataset_accessor("octree", pyvista.PolyData)
 class OctreeAccessor:
-    """The octree of a ``pyvista.PolyData`` of triangles. Arguments and answers are those of ``renderer.Octree``.
+    """The octree of a ``pyvista.PolyData`` of triangles, with the arguments and answers of ``renderer.Octree``.
 
-    The tree is built by the first question, and again after a change of the mesh that PyVista notices. A face's number
-    is that of the mesh's cell. Raises ``ValueError`` for a mesh that is not all triangles.
+    The tree is built by the first query, and again after a change of the mesh that PyVista notices. ``face`` is the
+    number of a cell. Queries raise ``ValueError`` for a mesh that is not all triangles.
 
+    Examples
+    --------
     >>> import pyvista
     >>> sheet = pyvista.Plane(i_resolution=1, j_resolution=1).triangulate()
     >>> sheet.octree.closest_hit([[0.1, 0.2, 3.0]], [[0, 0, -1]]).t
@@ -45,7 +48,7 @@ class OctreeAccessor:
         """The ``renderer.Octree`` of the mesh as it is now."""
         time = self._dataset.GetMTime()
         if self._octree is None or time != self._time:
-            # Late, so that PyVista's users who never ask import no compiler.
+            # Late, so that a mesh without queries imports no compiler.
             from renderer.octree import Octree
 
             # One that has no cells has no faces to speak of; vertices and lines are cells too.

@@ -1,14 +1,15 @@
-"""The questions that rays and points ask of a mesh: what ``Octree`` and ``BruteForce`` have in common."""
+"""The queries that ``Octree`` and ``BruteForce`` have in common."""
 
 from __future__ import annotations  # so that help() shows ArrayLike by its name
 
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from renderer.all_hits.all_hits import all_hits, count_hits
 from renderer.arguments.arrays import flag_argument
+from renderer.arguments.types import ArrayLike
 from renderer.distance.closest import closest_point
 from renderer.distance.signed import signed_distance
 from renderer.distance.visible import visible
@@ -24,7 +25,7 @@ from renderer.trace.batch import RayBatch, check_rays, offset_origins
 from renderer.trace.closest import any_hits, closest_hits
 from renderer.trace.error import add_errors
 from renderer.trace.layout import Tree
-from renderer.trace.leaving import check_leaving
+from renderer.trace.leaving import check_leaving, shapes_of_starts
 from renderer.trace.steps import count_steps
 
 
@@ -38,8 +39,12 @@ class Built(NamedTuple):
 class Queries:
     """Queries of one mesh; safe to call from many threads at once.
 
-    ``mesh`` is the mesh that was built over, to which a hit's ``face`` refers. ``repairs`` says what ``repair=True``
-    left out of the given arrays, and is None without it.
+    Attributes
+    ----------
+    repairs : Repairs or None
+        What ``repair=True`` left out of the given arrays.
+    threads : int
+        Threads of queries.
     """
 
     def __init__(self, mesh: Mesh, tree: Tree, threads: int | None) -> None:
@@ -50,11 +55,13 @@ class Queries:
 
     @property
     def mesh(self) -> Mesh:
-        """The mesh that was built over, and after a ``refit`` the moved one.
+        """The mesh, to which ``face`` of a hit refers. After a ``refit`` it is the moved one.
 
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
-        >>> octree = Octree.from_mesh(box())
+        >>> octree = Octree(box())
         >>> hit = octree.closest_hit([0.5, 0.25, 3], [0, 0, -1])
         >>> octree.mesh.faces[hit.face]
         array([4, 5, 7], dtype=int32)
@@ -81,31 +88,54 @@ class Queries:
         side: ArrayLike | None = None,
         t_error: bool = False,
     ) -> Hits:
-        """The nearest hit of each ray in the closed interval [t_min, t_max]; equal t: the lowest face.
+        """Return the nearest hit of each ray in the closed interval [t_min, t_max].
 
-        origins, directions  (..., 3), finite; their leading dimensions are broadcast, and the answers have these;
-                             directions are not zero, from 2^-300 to 2^700 long
-        t_min, t_max         >= 0, one number or (...), in units of |direction|
-        leaving              where the rays start on the surface: faces, one or (...), -1 for none; or the ``Hits`` at
-                             whose ``points`` they start, or these hits' ``through()``. No epsilon is needed. A ray
-                             starts exactly at the hit, or at the point of the face that is nearest to its origin. The
-                             faces that hold this point, those at an edge or corner too, do not stop it by rounding
-        side                 which side of the named faces the rays start on, one or (...): 1 that of the normal by
-                             winding, -1 the other one, 0 unknown. ``Hits`` know their own. A ray whose direction leads
-                             through the surface to another side is then stopped at once: t = 0. Where no side is known
-                             nothing stops it at its start
-        t_error              whether the hits have bounds of the errors of t: how far it may be from where the ray, as
-                             it was started, meets the face, or passes it, if only rounding makes it hit
+        Of equal t, the lowest face is hit. No face is culled. All arguments but ``t_error`` are broadcast together, and
+        the answers have that shape (...).
 
-        No face is culled. A ray in a face's plane misses it, unless the rounding of its slopes lifts it out of the
-        plane. The same bits for any number of threads. Raises ``ValueError`` naming argument and row.
+        Parameters
+        ----------
+        origins : array_like, shape (..., 3)
+            Where the rays start.
+        directions : array_like, shape (..., 3)
+            Of any length from 2^-300 to 2^700.
+        t_min, t_max : array_like, shape (...), default 0 and inf
+            The interval, in units of ``|direction|``; t_min >= 0.
+        leaving : array_like of int, shape (...), or Hits, optional
+            Where rays start on the surface: the face of each start, -1 for none; or the ``Hits`` at whose ``points``
+            they start; or ``hits.through()``, to go on behind the surface. The faces that hold the start, also those at
+            an edge or corner, do not stop the ray by rounding, so that no epsilon is needed.
+        side : array_like of int, shape (...), optional
+            The side of the faces in ``leaving`` that the rays start on: 1 that of the normal, -1 the other, 0 unknown.
+            A ray that leads through the surface to the other side is stopped at once, at t = 0. ``Hits`` know theirs.
+        t_error : bool, default False
+            Also bound the rounding error of each t, in ``hits.t_error``.
 
+        Returns
+        -------
+        Hits
+            ``t`` inf, ``face`` -1 and nan on a miss.
+
+        Raises
+        ------
+        ValueError
+            For a bad argument. The message names it and the row.
+
+        Notes
+        -----
+        A ray in a face's plane misses the face, unless rounding of its slopes lifts it out of the plane. The bits are
+        the same for any number of threads.
+
+        Examples
+        --------
         >>> from renderer import Octree
         >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-        >>> hits = octree.closest_hit([[0.1, 0.2, 3.0], [2, 2, 2]], [[0, 0, -1], [0, 0, -1]])
+        >>> hits = octree.closest_hit([[0.1, 0.2, 3.0], [2, 2, 2]], [0, 0, -1])
         >>> hits.t, hits.face
         (array([ 3., inf]), array([ 0, -1]))
-        >>> octree.closest_hit(hits.points[:1], [[0, 0, -1]], leaving=hits.face[:1]).hit
+        >>> octree.closest_hit([0.1, 0.2, 3.0], [0, 0, -1], t_max=[2.0, 4.0]).hit
+        array([False,  True])
+        >>> octree.closest_hit(hits.points[:1], [0, 0, -1], leaving=hits.face[:1]).hit
         array([False])
         """
         built = self._built
@@ -125,13 +155,22 @@ class Queries:
         *,
         side: ArrayLike | None = None,
     ) -> NDArray[np.bool_]:
-        """Whether each ray hits anything in the closed interval [t_min, t_max], (...) bool.
+        """Return whether each ray hits anything in the closed interval [t_min, t_max].
 
-        Arguments as for ``closest_hit``, but for ``t_error``.
+        Parameters
+        ----------
+        origins, directions, t_min, t_max, leaving, side
+            As for ``closest_hit``.
 
+        Returns
+        -------
+        ndarray of bool, shape (...)
+
+        Examples
+        --------
         >>> from renderer import Octree
         >>> octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-        >>> octree.any_hit([[0.1, 0.2, 3.0]], [[0, 0, -1]], t_max=[2.5])
+        >>> octree.any_hit([[0.1, 0.2, 3.0]], [0, 0, -1], t_max=2.5)
         array([False])
         """
         built = self._built
@@ -151,26 +190,35 @@ class Queries:
         max_hits: int | None = None,
         t_error: bool = False,
     ) -> AllHits:
-        """All hits of each ray in the closed interval [t_min, t_max], sorted by t, then face.
+        """Return all hits of each ray in the closed interval [t_min, t_max], sorted by t, then by face.
 
-        Arguments as for ``closest_hit``, and:
+        The first hit of a ray is its ``closest_hit``, bit for bit. Memory grows with the number of hits.
 
-        contacts  True: the hits of a ray at one edge or corner of the surface, told apart by position, are one contact,
-                  which is reported as the first of them. Thin walls and double faces stay two. False: each face that is
-                  hit has its row
-        max_hits  keep at most so many of each ray, the nearest
+        Parameters
+        ----------
+        origins, directions, t_min, t_max, leaving, side
+            As for ``closest_hit``.
+        contacts : bool, default True
+            Report hits of a ray at one edge or corner once, as the first of them. Edges are told apart by position, so
+            thin walls and double faces stay two hits. If False, each face that is hit is reported.
+        max_hits : int, optional
+            Keep at most this many hits of each ray, the nearest.
+        t_error : bool, default False
+            Also bound the rounding error of each t, in ``hits.t_error``.
 
-        The first row of a ray is its ``closest_hit``, bit for bit, and a ray has rows where ``any_hit`` is true. The
-        tree is not searched anew for each hit, and none is told from another by its distance. Memory grows with what is
-        found.
+        Returns
+        -------
+        AllHits
 
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
-        >>> octree = Octree.from_mesh(box())
-        >>> hits = octree.all_hits([[0.5, 0.5, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
+        >>> octree = Octree(box())
+        >>> hits = octree.all_hits([[0.5, 0.5, 3], [5, 5, 5]], [0, 0, -1])
         >>> hits.t, hits.offsets
         (array([2., 3.]), array([0, 2, 2]))
-        >>> octree.all_hits([[0.5, 0.5, 3]], [[0, 0, -1]], contacts=False).t
+        >>> octree.all_hits([[0.5, 0.5, 3]], [0, 0, -1], contacts=False).t
         array([2., 2., 3., 3.])
         """
         built = self._built
@@ -191,11 +239,22 @@ class Queries:
         side: ArrayLike | None = None,
         contacts: bool = True,
     ) -> NDArray[np.int64]:
-        """The number of rows that ``all_hits`` has for each ray, (...) int64.
+        """Return the number of hits that ``all_hits`` has for each ray.
 
+        Parameters
+        ----------
+        origins, directions, t_min, t_max, leaving, side, contacts
+            As for ``all_hits``.
+
+        Returns
+        -------
+        ndarray of int64, shape (...)
+
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
-        >>> Octree.from_mesh(box()).count_hits([[0.5, 0.5, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
+        >>> Octree(box()).count_hits([[0.5, 0.5, 3], [5, 5, 5]], [0, 0, -1])
         array([2, 0])
         """
         built = self._built
@@ -212,14 +271,25 @@ class Queries:
         *,
         side: ArrayLike | None = None,
     ) -> Steps:
-        """The nodes and triangles that the search for each ray's closest hit tests, for heat maps.
+        """Return how many nodes and triangles the search for each ray's closest hit tests, for heat maps.
 
-        Arguments as for ``closest_hit``, but for ``t_error``. The counts are those of a ray that travels alone and goes
-        to the nearest boxes first. Rays of one direction are traced together and test some more, at less cost.
+        The counts are those of a ray that travels alone and visits the nearest boxes first. Rays of one direction are
+        traced together: they test more, at less cost.
 
+        Parameters
+        ----------
+        origins, directions, t_min, t_max, leaving, side
+            As for ``closest_hit``.
+
+        Returns
+        -------
+        Steps
+
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import icosphere
-        >>> steps = Octree.from_mesh(icosphere(4)).count_steps([[0, 0, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, 1]])
+        >>> steps = Octree(icosphere(4)).count_steps([[0, 0, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, 1]])
         >>> steps.nodes > 1, steps.triangles > 0
         (array([ True, False]), array([ True, False]))
         """
@@ -238,10 +308,10 @@ class Queries:
         side: ArrayLike | None,
     ) -> tuple[RayBatch, tuple[int, ...]]:
         """The arguments of a query, checked, and moved off the faces that the rays leave; and their dimensions."""
-        rays, shape = check_rays(origins, directions, t_min, t_max)
         if leaving is None:
             expect(side is None, "side", "None without leaving", repr(side)[:40])
-            return rays, shape
+            return check_rays(origins, directions, t_min, t_max)
+        rays, shape = check_rays(origins, directions, t_min, t_max, shapes_of_starts(leaving, side))
         left = check_leaving(leaving, side, shape, len(built.mesh.faces))
         return offset_origins(rays, left, built.mesh, built.tree.scale, self.threads), shape
 
@@ -253,25 +323,44 @@ class Queries:
         *,
         winding: bool = False,
     ) -> NDArray[np.bool_]:
-        """Whether each point lies inside the closed mesh, (...,) bool, exactly: no votes and no tolerance.
+        """Return whether each point lies inside the closed mesh, exactly: without votes or tolerances.
 
-        points    (..., 3), finite
-        boundary  the answer for points on the surface itself, which is told exactly too
-        rule      "nonzero": inside where the surface winds around the point, so solids may overlap. "even-odd": inside
-                  where a way out crosses the surface an odd number of times, however its faces are turned
-        winding   for a mesh with holes: inside where ``winding_number``, to rounding, is above 1/2, so faces are to be
-                  counter-clockwise seen from outside. ``rule`` stays as it is
+        Parameters
+        ----------
+        points : array_like, shape (..., 3)
+        boundary : bool, default True
+            The answer for points exactly on the surface.
+        rule : {"nonzero", "even-odd"}, default "nonzero"
+            "nonzero": inside if the surface winds around the point; solids may overlap. "even-odd": inside if a way out
+            crosses the surface an odd number of times, however its faces are wound.
+        winding : bool, default False
+            For a mesh with holes: inside if ``winding_number``, to rounding, is above 1/2. Faces have to be
+            counter-clockwise seen from outside. Only with the default ``rule``.
 
-        The mesh is closed where each edge is passed as often in one direction as in the other ("nonzero") or an even
-        number of faces has it ("even-odd"), vertices told apart by position. The answer is that of real arithmetic for
-        the float64 coordinates given, and the same bits for any number of threads. Raises ``ValueError`` for points
-        that are not finite, with the row, and for a mesh that is not closed, with its open edges, unless ``winding``.
+        Returns
+        -------
+        ndarray of bool, shape (...)
 
-        Source: Shewchuk, Adaptive Precision Floating-Point Arithmetic, 1997, for the signs.
+        Raises
+        ------
+        ValueError
+            For a bad argument; and for a mesh that is not closed, unless ``winding``. The mesh is closed if each edge
+            is passed as often in one direction as in the other ("nonzero", see ``Mesh.is_closed``), or if an even
+            number of faces has it ("even-odd").
 
+        Notes
+        -----
+        The answer is that of real arithmetic for the given float64 coordinates.
+
+        References
+        ----------
+        Shewchuk, Adaptive Precision Floating-Point Arithmetic, 1997.
+
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
-        >>> octree = Octree.from_mesh(box())
+        >>> octree = Octree(box())
         >>> octree.contains([[0.5, 0.5, 0.5], [1, 0.5, 0.5], [2, 0, 0]])
         array([ True,  True, False])
         >>> octree.contains([[0.5, 0.5, 0.5], [1, 0.5, 0.5], [2, 0, 0]], boundary=False)
@@ -284,21 +373,37 @@ class Queries:
         return contains(tree, mesh, points, boundary, rule, winding, self.threads)
 
     def winding_number(self, points: ArrayLike, tolerance: float = 1e-3) -> NDArray[np.float64]:
-        """The number of times that the surface winds around each point, (...,) float64: its solid angles over 4 pi.
+        """Return how often the surface winds around each point: its solid angles over 4 pi.
 
-        points     (..., 3), finite
-        tolerance  the largest error, from 0, which sums over all faces. Looser is faster
+        Inside a closed mesh whose faces are counter-clockwise seen from outside it is 1, and outside 0. Where solids
+        overlap it is their number. With holes it lies between. On a face it is the mean of both sides.
 
-        Inside a closed mesh whose faces are counter-clockwise seen from outside it is 1, outside 0, and where solids
-        overlap their number. With holes it is a number between, and it falls from side to side of each face by 1. On a
-        face it is the mean of both sides. The error is bounded, not estimated: faces far away count together, as long
-        as what that may leave out stays below the tolerance. Rounding adds 2^-44 at most for each face that counts
-        alone. The same bits for any number of threads; those of ``BruteForce``, which sums over all faces, differ by
-        the tolerance. Raises ``ValueError`` naming argument and row. The first call takes some time to sum up the faces
-        of each octant, and a point some milliseconds whose coordinates, or the mesh's, are as unlike as 1 and 2^-300.
+        Parameters
+        ----------
+        points : array_like, shape (..., 3)
+        tolerance : float, default 1e-3
+            A bound of the error, from 0. Looser is faster, because faces far away count together; 0 sums over all.
+            Rounding adds at most 2^-44 for each face that counts alone.
 
-        Sources: Jacobson et al., Robust Inside-Outside Segmentation, 2013; Barill et al., Fast Winding Numbers, 2018.
+        Returns
+        -------
+        ndarray of float64, shape (...)
 
+        Raises
+        ------
+        ValueError
+            For a bad argument. The message names it and the row.
+
+        Notes
+        -----
+        The first call takes some time to sum up the faces of each octant.
+
+        References
+        ----------
+        Jacobson et al., Robust Inside-Outside Segmentation, 2013; Barill et al., Fast Winding Numbers, 2018.
+
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
         >>> lidless = Octree(box((-1, -1, -1), (1, 1, 1)).vertices, box().faces[:-2])
@@ -309,19 +414,36 @@ class Queries:
         return winding_number(tree, mesh, points, tolerance, self.threads)
 
     def closest_point(self, points: ArrayLike, max_distance: ArrayLike = np.inf) -> ClosestPoints:
-        """The point of the surface that is nearest to each point; equal distances: the lowest face.
+        """Return the nearest point of the surface to each point.
 
-        points        (..., 3), finite
-        max_distance  >= 0, one number or (...): nothing is found beyond it, and the search ends sooner
+        Of equal distances, the lowest face is named. Points and ``max_distance`` are broadcast together.
 
-        The distance is the exact one, rounded: within an ulp of it. Nearer to the surface than 2^-64 of the distance to
-        the face's farthest corner it is within 2^-90 of that. It is 0 on the surface, and else only nearer to it than
-        2^-900 of that. The same bits for any number of threads. Raises ``ValueError`` naming argument and row, and for
-        a mesh without faces.
+        Parameters
+        ----------
+        points : array_like, shape (..., 3)
+        max_distance : array_like, shape (...), default inf
+            Nothing is found beyond it, and the search ends sooner.
 
+        Returns
+        -------
+        ClosestPoints
+            ``distance`` inf, ``face`` -1 and nan if nothing is within ``max_distance``.
+
+        Raises
+        ------
+        ValueError
+            For a bad argument, and for a mesh without faces.
+
+        Notes
+        -----
+        The distance is within one ulp of the exact one, and 0 on the surface. For points nearer to the surface than
+        2^-64 of the distance to the face's farthest corner, the error is at most 2^-90 of that.
+
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
-        >>> near = Octree.from_mesh(box()).closest_point([[0.5, 0.5, 3], [0.5, 0.5, 0.75]])
+        >>> near = Octree(box()).closest_point([[0.5, 0.5, 3], [0.5, 0.5, 0.75]])
         >>> near.distance, near.points.tolist()
         (array([2.  , 0.25]), [[0.5, 0.5, 1.0], [0.5, 0.5, 1.0]])
         """
@@ -336,16 +458,34 @@ class Queries:
         *,
         winding: bool = False,
     ) -> NDArray[np.float64]:
-        """The distance of each point from the surface of the closed mesh, (...) float64: positive OUTSIDE, negative
-        inside, exactly 0 on it.
+        """Return the distance of each point from the surface of the closed mesh: positive OUTSIDE, negative inside.
 
-        As Open3D and libigl have it; trimesh has the other sign. The distance is that of ``closest_point``, the sign
-        that of ``contains``, never that of the nearest normal. Arguments and errors as for these; beyond
-        ``max_distance`` it is inf or -inf.
+        Open3D and libigl have the same sign, trimesh the other one. The distance is that of ``closest_point``, and the
+        sign that of ``contains``, never that of the nearest normal.
 
+        Parameters
+        ----------
+        points : array_like, shape (..., 3)
+        max_distance : array_like, shape (...), default inf
+            As for ``closest_point``.
+        rule, winding
+            As for ``contains``.
+
+        Returns
+        -------
+        ndarray of float64, shape (...)
+            0 exactly on the surface; inf or -inf beyond ``max_distance``.
+
+        Raises
+        ------
+        ValueError
+            As ``closest_point`` and ``contains`` do.
+
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
-        >>> Octree.from_mesh(box()).signed_distance([[0.5, 0.5, 3], [0.5, 0.5, 0.75], [1, 1, 1]])
+        >>> Octree(box()).signed_distance([[0.5, 0.5, 3], [0.5, 0.5, 0.75], [1, 1, 1]])
         array([ 2.  , -0.25,  0.  ])
         """
         mesh, tree = self._built
@@ -358,20 +498,36 @@ class Queries:
         leaving: ArrayLike | None = None,
         reaching: ArrayLike | None = None,
     ) -> NDArray[np.bool_]:
-        """Whether nothing lies between each point and its target, (...) bool; the shapes of both are broadcast.
+        """Return whether nothing lies between each point and its target.
 
-        points, targets    (..., 3), finite
-        leaving, reaching  the faces that the points and the targets lie on, one or (...), -1 where that is not known:
-                           then it is found out
+        All arguments are broadcast together. No end hides itself: the faces that hold it hide nothing. A surface that
+        the segment only touches hides.
 
-        No end hides itself: the faces that hold it, those at an edge or corner too, hide nothing. What is nearer to an
-        end, along the way, than 2^-40 of the largest coordinate of both is not looked at, unless the end lies on the
-        surface. A surface that the way only touches hides. Raises ``ValueError`` naming argument and row.
+        Parameters
+        ----------
+        points, targets : array_like, shape (..., 3)
+        leaving, reaching : array_like of int, shape (...), optional
+            The faces that the points and the targets lie on; -1 or None if unknown, then it is found out.
 
+        Returns
+        -------
+        ndarray of bool, shape (...)
+
+        Raises
+        ------
+        ValueError
+            For a bad argument. The message names it and the row.
+
+        Notes
+        -----
+        Unless an end lies on the surface, hits within 2^-40 of it are ignored, relative to the largest coordinate of
+        both ends.
+
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
-        >>> octree = Octree.from_mesh(box())
-        >>> octree.visible([0.5, 0.5, 3], [[0.5, 0.5, 1], [0.5, 0.5, 0], [3, 0.5, 3]])
+        >>> Octree(box()).visible([0.5, 0.5, 3], [[0.5, 0.5, 1], [0.5, 0.5, 0], [3, 0.5, 3]])
         array([ True, False,  True])
         """
         mesh, tree = self._built

@@ -1,4 +1,4 @@
-"""Write the animated picture of the README: ``python scenes/make_turntable.py [file.webp]``; needs Pillow.
+"""Write the animated picture of docs/how-it-works.md: ``python scenes/make_turntable.py [file.webp]``; needs Pillow.
 
 The camera turns once around the main scene, first by itself, then with the boxes of the octree's nodes, a level
 deeper every few frames. Both are ours: the picture is ray traced, and a box's edge is seen where it lies before

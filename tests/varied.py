@@ -84,7 +84,7 @@ OTHERS: dict[type[Fields], Table] = {
     Floor: {"min": [-2.5, -1.0], "max": [1.0, 2.5], "materials": ["chalk", "steel"], "squares": [5, 2]},
     RenderSettings: {"resolution": [9, 7], "samples": 9, "max_depth": 0, "min_weight": 0.25, "max_rays": 5,
                      "shadows": False},
-    Scene: {"ambient": [0.7, 0.1, 0.2], "background": [0.8, 0.1, 0.3]},
+    Scene: {"ambient": [0.7, 0.1, 0.2], "background": [0.8, 0.1, 0.3], "up": "z"},
 }  # fmt: skip
 
 

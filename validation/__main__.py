@@ -1,4 +1,4 @@
-"""``octree-validate``: judge hits and pictures, write the report, exit 1 when a gate fails.
+"""``octree-validate``: judge hits and pictures, or compare hits with recorded ones; exit 1 when a gate fails.
 
 ``python -m validation`` does the same in a checkout: Python prefers a folder ``validation`` in the current folder.
 """
@@ -14,7 +14,7 @@ from renderer.system.interrupt import interruptible
 from renderer.system.terminal import one_line
 from validation.options import make_parser, program
 from validation.output import check_output
-from validation.sections import NAMES, choose
+from validation.sections import choose
 
 if TYPE_CHECKING:
     from validation.gates import Gate
@@ -36,30 +36,55 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
 
 
+# The options that do another thing than a run, and those that go with them.
+_MODES = {
+    "--defects": ("--output", "--quick"),
+    "--write-baseline": ("--output",),
+    "--record": ("MESH",),
+    "--compare": ("MESH", "--tolerance", "--output"),
+}
+
+
 def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
     """Exit with code 2 where arguments are missing or contradict each other."""
+    _check_mode(parser, options)
+    options.mesh = [*options.mesh, *options.meshes]
+    if options.record or options.compare:
+        return
     check_output(parser, options)
     kinds = {kind for kind in ("scene", "mesh") if getattr(options, kind)}
-    modes = {"--defects": options.defects, "--write-baseline": options.write_baseline}
-    given = [mode for mode, value in modes.items() if value]
-    if given:
-        alone = given[0]
-        others = [f"--{kind}" for kind in sorted(kinds)] + ["--gate"] * (options.gate is not None)
-        others += ["--only"] * (options.only != NAMES) + ["--random"] * (options.random is not None) + given[1:]
-        others += ["--quick"] * (options.quick and not options.defects)
-        if others:
-            fitting = "--output and --quick" if options.defects else "--output"
-            parser.error(f"{alone} goes with {fitting} alone, got {others[0]} too")
     chosen, left_out = choose(options.only, kinds)
     if not chosen:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in left_out.items())
         parser.error(f"no section is left to run ({reasons})")
     if options.random is not None and "random" in left_out:
-        parser.error(f"--random is of the section random, which does not run: {left_out['random']}")
+        parser.error(f"--random: the section random does not run: {left_out['random']}")
+
+
+def _check_mode(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    given = [
+        action.option_strings[0] if action.option_strings else str(action.metavar)
+        for action in parser._actions
+        if getattr(options, action.dest, action.default) != action.default
+    ]
+    mode = next((mode for mode in _MODES if mode in given), None)
+    if mode is None:
+        if "--tolerance" in given:
+            parser.error("--tolerance goes with --compare, got none")
+        return
+    for other in given:
+        if other not in (mode, *_MODES[mode]):
+            parser.error(f"{mode} goes with {' and '.join(_MODES[mode])} alone, got {other} too")
+    count = len(options.meshes)
+    if count > 1 or (mode == "--record" and not count):
+        expected = "one mesh" if mode == "--record" else "at most one mesh"
+        parser.error(f"{mode}: expected {expected} after the file, got {count}")
 
 
 def _run(options: argparse.Namespace, command: str) -> int:
     # Imported here: --help and argument errors need no heavy import, and a missing reference becomes a one-line error.
+    if options.record or options.compare:
+        return _recorded(options)
     from validation import suite
 
     if options.write_baseline:
@@ -78,6 +103,15 @@ def _run(options: argparse.Namespace, command: str) -> int:
     if options.defects:
         return _defects_verdict(suite.run_defects(request), request)
     return _verdict(suite.run(request), request)
+
+
+def _recorded(options: argparse.Namespace) -> int:
+    from validation.recorded import command
+
+    if options.record:
+        return command.record(options.record, *options.meshes)
+    mesh = options.meshes[0] if options.meshes else None
+    return command.compare_with(options.compare, mesh, options.tolerance or 0.0, options.output)
 
 
 def _verdict(metrics: Mapping[str, Any], request: "Request") -> int:

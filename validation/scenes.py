@@ -25,5 +25,5 @@ SCENE_CASES = (
     Case("mirrors", "diffuse objects between mirrors: what a path integrator can judge without any recursion of ours"),
     Case("glass", "dielectrics: refraction, total internal reflection, tinted glass, highlights", every_rung=True),
     Case("checkered", "a diffuse, a mirroring and two glass objects on a checkered floor: what the benchmark renders"),
-    Case("stairs", "flat faces under an orthographic camera, hits known by hand"),
+    Case("stairs", "flat faces under an orthographic camera, hits with known answers"),
 )

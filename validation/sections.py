@@ -48,5 +48,5 @@ def _reason(section: Section, only: Collection[str], given: Collection[str]) -> 
     if not given or section.judges in given:
         return None
     if section.judges is None:
-        return "judges only what the suite brings along, and the run was given files of its own"
+        return "it judges input of the suite alone, and this run has files of yours"
     return f"no file was given by --{section.judges}"

@@ -133,9 +133,8 @@ def _sections(chosen: Sequence[Section], job: Job) -> tuple[dict[str, dict[str, 
 def _outcome(records: dict[str, dict[str, Any]], gates: list[dict[str, Any]], output: Path) -> dict[str, Any]:
     """What follows from records and gates, and what an earlier run stored about defects."""
     defects = stored_defects(output)
-    rows = summary.matrix(records, gates)
-    found = {"gates": gates, "verdict": summary.verdict(gates), "matrix": rows}
-    found["facts"] = summary.facts(rows, gates, defects)
+    found = {"gates": gates, "verdict": summary.verdict(gates), "matrix": summary.matrix(records, gates)}
+    found["facts"] = summary.facts(records, gates, defects)
     return found | ({} if defects is None else {"defects": defects})
 
 

@@ -104,7 +104,7 @@ REASONS = {
     "ssim_foreground": "the same over the objects alone, which a flat background cannot raise",
     "pixel_share": "share of pixels off by more than 1/255 in sRGB",
     "mean_error": "brightness, which SSIM does not see; linear radiance",
-    "flip": "what somebody sees who flips between the pictures: colour and contrast over an area",
+    "flip": "the difference that one sees when flipping between the pictures",
     "max_error": "one wrong pixel outside the fragile ones; sRGB",
 }
 

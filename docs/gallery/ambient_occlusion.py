@@ -2,7 +2,8 @@
 Ambient occlusion on a scan
 ===========================
 
-A scanner sees points of a surface; the share of even light from all sides that reaches each shows its dents.
+A simulated scanner samples a surface. At each point, the share of even light from all sides that arrives shows the
+dents.
 """
 
 import os

@@ -2,8 +2,8 @@
 Error map against Mitsuba
 =========================
 
-The same scene by this renderer and by a Whitted recursion over Mitsuba's own hits, materials and lights. Mitsuba traces
-in float32, which is what the difference shows; a silhouette may also fall on the other side of a pixel's centre.
+One scene, drawn by this renderer and by a Whitted ray tracer over Mitsuba's hits, materials and lights. Mitsuba traces
+in float32, which explains the difference; a silhouette may also fall on the other side of a pixel's centre.
 """
 
 import os
@@ -17,7 +17,7 @@ from renderer import load_scene, render
 SIZE = int(os.environ.get("GALLERY_SIZE", "400")) // 3
 
 if find_spec("mitsuba") is None:
-    print("skipped: there is no Mitsuba here (pip install '.[validate]')")
+    print("skipped: Mitsuba is not installed (pip install '.[validate]')")
 else:
     import mitsuba
 
@@ -28,9 +28,7 @@ else:
     ours = render(scene, resolution=(SIZE, SIZE), max_depth=6, samples=1, min_weight=0.0, offset="mitsuba")
     theirs = whitted(scene, SIZE, SIZE, max_depth=6)
     error = np.abs(ours.radiance - theirs).max(axis=-1)
-    print(
-        f"error: {error.max():.2g} at most, {error.mean():.2g} in the mean, above 0.01 in {(error > 0.01).sum()} pixels"
-    )
+    print(f"error: at most {error.max():.2g}, mean {error.mean():.2g}, above 0.01 in {(error > 0.01).sum()} pixels")
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
     left.imshow(ours.radiance.clip(0.0, 1.0) ** (1 / 2.2))

@@ -2,8 +2,8 @@
 Glass study
 ===========
 
-One ball of glass with growing index of refraction: total reflection and the image within the ball change, by Snell and
-Fresnel.
+A glass ball with a growing index of refraction: reflections and the image inside the ball change by the laws of Snell
+and Fresnel.
 """
 
 import os

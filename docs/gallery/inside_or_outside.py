@@ -2,7 +2,7 @@
 Inside or outside
 =================
 
-A grid of points in a plane through a knot: which lie inside, exactly, and how far each is from the surface.
+Slice a knot with a plane of points: which of them lie inside, exactly, and how far is each from the surface?
 """
 
 import os

@@ -2,7 +2,7 @@
 An octree, level by level
 =========================
 
-The boxes of nodes and leaves: each fits what lies in it, so that rays through the gaps test nothing.
+The boxes of nodes and leaves. Each box fits its contents tightly, so rays through the gaps test nothing.
 """
 
 import os

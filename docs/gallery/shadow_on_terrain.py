@@ -2,7 +2,8 @@
 Shadow on terrain
 =================
 
-A day's course of the sun over hills: hours of sun of each triangle, without an epsilon, though all lie on the surface.
+Hours of sun for each triangle of a hilly terrain, over one day. All points lie on the surface, and no epsilon is
+needed.
 """
 
 import os

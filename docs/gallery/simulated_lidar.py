@@ -2,7 +2,7 @@
 Simulated lidar
 ===============
 
-A scanner with 32 rings in a street of boxes: the point cloud without noise, coloured by height.
+A scanner with 32 rings in a street of boxes: a point cloud without noise, coloured by height.
 """
 
 import os
@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from renderer import Mesh, Octree
-from renderer.mesh.shapes import box
+from renderer.shapes import box
 from renderer.studies import scan
 
 SIZE = int(os.environ.get("GALLERY_SIZE", "400"))
@@ -27,7 +27,7 @@ octree = Octree.from_mesh(Mesh.concatenate(boxes))
 azimuth, height = np.meshgrid(np.linspace(-np.pi, np.pi, 4 * SIZE), np.tan(np.radians(np.linspace(-25, 15, 32))))
 directions = np.stack([np.cos(azimuth), np.sin(azimuth), height], axis=-1).reshape(-1, 3)
 cloud = scan(octree, (0.0, 0.0, 1.9), directions / np.linalg.norm(directions, axis=1, keepdims=True), distance=60.0)
-print(f"{len(cloud.points):,} of {azimuth.size:,} rays met something within 60 m")
+print(f"{len(cloud.points):,} of {azimuth.size:,} rays hit something within 60 m")
 
 plt.figure(figsize=(9, 4))
 plt.scatter(*cloud.points[:, :2].T, c=cloud.points[:, 2], s=2.5, cmap="turbo", linewidths=0)

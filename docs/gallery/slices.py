@@ -2,8 +2,8 @@
 Slices by all hits
 ==================
 
-All hits of parallel rays, not the first alone: pairs of hits are where a ray is within the body. Laid side by side they
-are slices, and their lengths added up are an X-ray picture.
+Find all hits of parallel rays, not only the first. Each pair of hits is a stretch inside the body. Side by side these
+stretches form slices; their lengths added up form an X-ray picture.
 """
 
 import os

@@ -2,7 +2,8 @@
 Thickness
 =========
 
-How far it is to the next surface, straight inwards from each point that a camera sees: what moulds and prints ask for.
+The distance straight inwards to the next surface, for each point that a camera sees: what moulds and 3D prints need to
+know.
 """
 
 import os
@@ -19,9 +20,9 @@ octree = Octree.from_mesh(load_mesh("../../scenes/models/teapot.ply"))
 center = octree.mesh.vertices.mean(axis=0)
 camera = OrthographicCamera(eye=(center[0], center[1], 9.0), target=tuple(center), height=2.4)
 hits = octree.closest_hit(*primary_rays(camera, SIZE, SIZE))
-inward = octree.all_hits(hits.points[hits.hit], -hits.normals[hits.hit], leaving=hits.face[hits.hit], max_hits=1)
+inward = octree.closest_hit(hits.points[hits.hit], -hits.normals[hits.hit], leaving=hits.face[hits.hit])
 thickness = np.full(hits.hit.shape, np.nan)
-thickness[np.flatnonzero(hits.hit)[inward.ray]] = inward.t  # in scene units, as normals are of unit length
+thickness[hits.hit] = np.where(inward.hit, inward.t, np.nan)  # in scene units, because normals have unit length
 
 plt.imshow(thickness.reshape(SIZE, SIZE), cmap="plasma")
 plt.colorbar(label="thickness", shrink=0.6)

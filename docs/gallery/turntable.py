@@ -2,7 +2,7 @@
 Turntable
 =========
 
-Eight pictures around a scene, of which the tree is built once.
+Eight pictures around a scene. The tree is built once.
 """
 
 import os

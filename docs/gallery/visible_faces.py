@@ -2,8 +2,8 @@
 Visible faces
 =============
 
-Which triangles does an eye see? Beside each other: what it sees itself, and the same mesh from the side, where what it
-cannot see is red.
+Which triangles does an eye see? On the left the view from this eye; on the right the same mesh from the side, where
+unseen faces are red.
 """
 
 import os

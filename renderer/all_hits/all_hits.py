@@ -1,4 +1,4 @@
-"""All hits of a batch of rays, or their number: in chunks, on threads, in memory that what is found needs."""
+"""The queries ``all_hits`` and ``count_hits``: chunks of rays on threads, in memory that grows with the hits found."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _ANY_NUMBER = np.iinfo(np.int64).max
 
 
 class _Part(NamedTuple):
-    """Hits of rays that follow each other: t, u and v, (3, k) float64, and face and side, (2, k) int64."""
+    """Hits of consecutive rays: t, u and v, (3, k) float64, and face and side, (2, k) int64."""
 
     doubles: NDArray[np.float64]
     integers: NDArray[np.int64]
@@ -51,7 +51,7 @@ def all_hits(
     shape: tuple[int, ...],
     threads: int,
 ) -> AllHits:
-    """All hits of a batch of some dimensions, see ``Octree.all_hits``."""
+    """All hits of a batch of rays, see ``Octree.all_hits``."""
     choice = Choice(flag_argument("contacts", contacts), _most(max_hits), True)
     counts, parts = _gathered(tree, rays, choice, threads)
     offsets = np.zeros(len(counts) + 1, np.int64)
@@ -73,7 +73,7 @@ def _most(max_hits: int | None) -> int:
 
 
 def _gathered(tree: Tree, rays: RayBatch, choice: Choice, threads: int) -> tuple[NDArray[np.int64], list[_Part]]:
-    """How many hits each ray has, and the hits in the order of the rays."""
+    """The number of hits of each ray, and the hits in the order of the rays."""
     count = rays.number
     counts, parts, bad = np.zeros(count, np.int64), dict[int, _Part](), list[int]()
 

@@ -1,6 +1,6 @@
 """The blocks that rays may hit, found as a stream.
 
-A block is listed where the ray passes some face's edges on the same side; where the hit lies is left to ``gather``.
+A block is listed if the ray passes all edges of one of its faces on the same side; ``gather`` computes the hit.
 """
 
 from typing import Any, NamedTuple
@@ -24,7 +24,7 @@ _ROUNDS = 1 << 12
 
 
 class Candidates(NamedTuple):
-    """Pointers to int64: LISTED blocks for each ray; how many were met, which may be more; and the rays' numbers, with
+    """Pointers to int64: LISTED blocks for each ray; the number found, which may be larger; and the rays' numbers, with
     room for WIDTH more.
     """
 
@@ -40,7 +40,7 @@ def make_candidates(words):
 
 
 class _Query(NamedTuple):
-    """Rays in lanes, the number of the first, and where the blocks that they meet are listed."""
+    """Rays in lanes, the number of the first, and the lists of the blocks that they enter."""
 
     prepared: Prepared
     lanes: Lanes
@@ -52,7 +52,8 @@ class _Query(NamedTuple):
 def find_blocks(tree, rays, begin, end, scratch, found):
     """List the blocks that the rays from ``begin`` on may hit, at most TOGETHER rays.
 
-    Returns the ray before which it ended, ``end`` unless there was much to do, and the rounds of sixteen rays, about.
+    Returns the ray before which it ended, ``end`` unless there was much work, and roughly the number of rounds of
+    sixteen rays.
     """
     count, query = end - begin, _Query(scratch.prepared, scratch.lanes, begin, found)
     clear_lanes(scratch.lanes)
@@ -69,7 +70,7 @@ def find_blocks(tree, rays, begin, end, scratch, found):
 
 @inlined
 def _see_leaves(tree, query, lanes, count):
-    """Compute of each of ``count`` rays which faces it passes within, in the first block of its leaf."""
+    """For each of ``count`` rays, find the faces whose edges it passes within, in the first block of its leaf."""
     for k in range(count):
         r = load(lanes.at_leaf, k)
         block = first_block(load(query.prepared.integers, CHILD + r))
@@ -79,7 +80,7 @@ def _see_leaves(tree, query, lanes, count):
 
 @inlined
 def _list_seen(tree, query, k):
-    """List the block of the k-th ray at a leaf if it passes within a face."""
+    """List the block of the k-th ray at a leaf, if it passes within a face."""
     r, integers = load(query.lanes.at_leaf, k), query.prepared.integers
     # rule: seen-blocks
     if load(query.lanes.bits, k) != 0:

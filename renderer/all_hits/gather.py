@@ -1,7 +1,7 @@
-"""All hits of each ray of a range, in compressed rows: found through the tree in any order, merged, then sorted.
+"""All hits of each ray of a range, in compressed rows: found in any order, merged, then sorted.
 
-A contact is the hits of one ray at one edge or corner of the surface, told apart by position, or one hit between them.
-It counts as its first hit, so the first contact is the closest hit.
+A contact is all hits of a ray at one edge or corner of the surface, compared by position, or one hit inside a face. It
+is reported as its first hit, so the first contact is the closest hit.
 """
 
 from typing import Any, NamedTuple
@@ -50,7 +50,7 @@ def _row(found, row, i):
 
 
 class Choice(NamedTuple):
-    """Whether hits become contacts, the most of them of a ray, and whether they are kept or counted only."""
+    """Whether hits are merged to contacts, the most for each ray, and whether they are kept or only counted."""
 
     contacts: bool
     most: int
@@ -59,7 +59,7 @@ class Choice(NamedTuple):
 
 @kernel
 def gather_chunk(descriptor, rays, begin, end, choice, counts, doubles, integers, scratch):
-    """Gather the hits of the rays begin:end; how many each has goes to ``counts``, one int64 a ray.
+    """Gather the hits of the rays begin:end, and write their numbers to ``counts``, one int64 for each ray.
 
     doubles   (DOUBLE_ROWS, capacity) float64, integers (INTEGER_ROWS, capacity) int64: memory, and what is kept
     scratch   a ``traverse.Scratch`` for CANDIDATE_WORDS rays
@@ -96,7 +96,7 @@ def gather_chunk(descriptor, rays, begin, end, choice, counts, doubles, integers
 
 
 class _Query(NamedTuple):
-    """A ray, its t_max, and where its hits are listed."""
+    """A ray, its t_max, and the list of its hits."""
 
     single: SingleRay
     t_max: float
@@ -105,7 +105,7 @@ class _Query(NamedTuple):
 
 @kernel
 def _list_all(tree, rays, i, candidates, k, found, scratch):
-    """List all hits of ray ``i``, the k-th candidate; returns their number, of which the capacity is listed."""
+    """List all hits of ray ``i``, the k-th candidate. Returns their number, of which at most the capacity is listed."""
     ray, t_max = ray_at(rays, i)
     if ray.leaving >= 0.0:
         return _list_from(tree, rays, i, ray, t_max, found, scratch)
@@ -120,7 +120,7 @@ def _list_all(tree, rays, i, candidates, k, found, scratch):
 
 @inlined
 def _enter(tree, query, node, count):
-    """Go on where the ray of a ``_Query`` or a ``_QueryFrom`` goes."""
+    """Enter the octants that the ray of a ``_Query`` or ``_QueryFrom`` enters."""
     return count, enter_node(tree, node, query.single, query.t_max)[1]
 
 
@@ -150,7 +150,7 @@ def _edges_at(tree, block, hits, i, shear):
 
 @inlined
 def _add_hit(tree, query, count, hit, block, i, edges):
-    """Add a hit on the i-th face of a block to the list if it is in the ray's interval; returns the number of hits."""
+    """Add a hit on the i-th face of a block to the list if it is in the ray's interval. Returns the number of hits."""
     found = query.found
     if not query.single.ray.t_min <= hit.t <= query.t_max:
         return count
@@ -162,7 +162,7 @@ def _add_hit(tree, query, count, hit, block, i, edges):
 
 @kernel
 def _list_from(tree, rays, i, ray, t_max, found, scratch):
-    """``_list_all`` for a ray that leaves the surface. What stops it at its start are its first hits."""
+    """``_list_all`` for a ray that leaves the surface; hits that stop it at its start come first."""
     stack = scratch.packet_stack
     departure, stopped = depart(tree, rays.starts, i, ray, stack, scratch.holders)
     ray, count, pile = departure.ray, np.int64(0), np.int64(load(offset(rays.starts.rows, i * rays.starts.step), PILE))
@@ -173,7 +173,7 @@ def _list_from(tree, rays, i, ray, t_max, found, scratch):
         if count < found.capacity:
             _list_hit(found, count, face, stopped, _FIRST + count, np.int64(0))
         count += 1
-        # The sign of 0 tells the next face of the pile from one that begins another.
+        # -0.0 marks the next face of the pile, 0.0 the first face of another.
         pile = pile if is_negative(stopped.t) else face
         stopped = stopped_again(tree, departure, face, pile, scratch.holders)
     query = _QueryFrom(departure, prepare_single(ray), t_max, found, rays.starts, i)
@@ -181,7 +181,7 @@ def _list_from(tree, rays, i, ray, t_max, found, scratch):
 
 
 class _QueryFrom(NamedTuple):
-    """``_Query`` of a ray that leaves the surface, and which of the rays with such starts it is."""
+    """``_Query`` for a ray that leaves the surface, and its number among those."""
 
     departure: Departure
     single: SingleRay
@@ -236,7 +236,7 @@ def _list_hit(found, i, face, hit, place, edges):
 
 @kernel
 def _ordered(tree, found, count, merge, sort):
-    """Write the order of the listed hits, or of the contacts that they make, by t, then face; returns their number."""
+    """Write the order of the listed hits, or of their contacts, by t, then face. Returns their number."""
     order = offset(found.integers, _row(found, _ORDER, 0))
     if merge:
         _merge(tree, found, count, order)
@@ -251,7 +251,7 @@ def _ordered(tree, found, count, merge, sort):
 
 @kernel
 def _merge(tree, found, count, order):
-    """Mark, of the hits at one edge or corner, all but the first as merged."""
+    """Mark all but the first of the hits at one edge or corner as merged."""
     on_edges = 0
     for i in range(count):
         store(order, on_edges, i)
@@ -266,7 +266,7 @@ def _merge(tree, found, count, order):
 
 @kernel
 def _sort(tree, found, order, count, by_place):
-    """Sort ``order`` by t, then face, of the hits it names; or by their places first. A heap, as rays may hit much."""
+    """Sort ``order`` by t, then face, of its hits; or first by their places. A heap sort, for rays with many hits."""
     for start in range(count // 2 - 1, -1, -1):
         _sift(tree, found, order, start, count, by_place)
     for end in range(count - 1, 0, -1):
@@ -278,7 +278,7 @@ def _sort(tree, found, order, count, by_place):
 
 @kernel
 def _sift(tree, found, order, parent, count, by_place):
-    """Let an entry of a heap sink to its place."""
+    """Move an entry of a heap down to its place."""
     sinking = load(order, parent)
     while 2 * parent + 1 < count:
         child = 2 * parent + 1
@@ -309,7 +309,7 @@ def _precedes(tree, found, i, j, by_place):
 
 @kernel
 def _compare_places(tree, found, i, j):
-    """The order, -1, 0 or 1, of the edges or corners that two hits lie at, by their ends' coordinates."""
+    """The order, -1, 0 or 1, of the edges or corners of two hits, by the coordinates of their ends."""
     a, b = _ends(tree, found, i)
     c, d = _ends(tree, found, j)
     first = _compare_corners(tree, a, c)
@@ -318,7 +318,7 @@ def _compare_places(tree, found, i, j):
 
 @kernel
 def _ends(tree, found, i):
-    """The places in its block of the ends of a hit's edge, the lower first; of a corner, that twice."""
+    """The places in a block of the ends of a hit's edge, the lower first; for a corner, that twice."""
     place = load(found.integers, _row(found, _AT, i))
     edges = load(found.integers, _row(found, _EDGES, i))
     # rule: corner-of-edges

@@ -1,5 +1,6 @@
 """Arguments that stand for arrays, such as lists or columns of tables, as NumPy arrays of real numbers."""
 
+from collections.abc import Iterator
 from numbers import Real
 from typing import Any
 
@@ -68,7 +69,11 @@ def plain_array(values: Any) -> NDArray[Any]:
     try:
         if hasattr(values, "__dlpack__") and not hasattr(values, "__array__"):
             return np.from_dlpack(values)
-        return np.asarray(values)
+        array = np.asarray(values)
+        if array.dtype.kind == "O" and array.ndim == 0 and isinstance(values, Iterator):
+            raise ValueError(f"a {type(values).__name__}, which list() makes a list of")
+        return array
     # A ragged list; memory of another device, or a tensor whose gradient is wanted.
     except (ValueError, TypeError, RuntimeError, BufferError) as error:
-        raise ValueError(f"expected an array, got {error}") from None
+        got = "rows of different lengths" if "inhomogeneous" in str(error) else error
+        raise ValueError(f"expected an array, got {got}") from None

@@ -1,12 +1,13 @@
-"""Points as queries get them: shape, type and finiteness are checked."""
+"""Points of queries: shape, type and finiteness are checked."""
 
 from math import isfinite
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from renderer.arguments.arrays import real_argument
 from renderer.arguments.limits import FARTHEST
+from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 
 
@@ -33,6 +34,6 @@ def check_points(
 
 
 def farthest_of(scale: float) -> float:
-    """The largest coordinate of a point whose distance from a mesh is asked; ``scale`` is the tree's."""
+    """The largest coordinate of a point in a distance query; ``scale`` is the tree's."""
     with np.errstate(over="ignore"):
         return float(np.float64(FARTHEST) / scale)

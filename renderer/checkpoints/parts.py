@@ -1,12 +1,11 @@
-"""The parts of a long run on disk: what is done stays done when the run is killed, and is not done again.
+"""The parts of a long run on disk, so that a killed run goes on where it stopped.
 
-A folder beside the result has ``manifest.json``, which says what is computed of what, and a file for each part that is
-done: its rows as they are in memory, and behind them the SHA-256 of the manifest, the part's number and the rows. Each
-file is written beside and renamed, so a part is whole or absent; one that a disk has spoilt counts as absent, and so
-does one of another run, left where the removal of its folder was cut short. The result is made of all parts, and the
-folder removed.
+A folder beside the result has ``manifest.json``, which says what is computed from what, and a file for each finished
+part: its rows, then the SHA-256 of the manifest, the number of the part and the rows. Files are written beside and
+renamed, so a part is whole or absent. A damaged part and one of another run count as absent. When all parts are there,
+the result is made of them and the folder removed.
 
-A part's rows need not follow each other in the result: an order says which row each place of the parts is.
+The rows of a part need not follow each other in the result: an order says which row of it each place of the parts is.
 """
 
 from __future__ import annotations
@@ -36,10 +35,10 @@ _MOST_BYTES = 1 << 26
 
 @dataclass(frozen=True)
 class Plan:
-    """The result of a run, in parts, and all that it depends on.
+    """The shape of a run's result, its parts, and all that it depends on.
 
-    rows       of the result, one a point of a study, or a row of pixels
-    size       rows of a part; the last may have fewer
+    rows       rows of the result: points of a study, or rows of pixels
+    size       rows of a part; the last part may have fewer
     width      values of a row; 0: the result has one dimension
     dtype      of the values, as NumPy spells it
     made_of    all that the values depend on: numbers, texts, and digests of arrays
@@ -74,12 +73,12 @@ class Parts:
     """The folder of a run under way."""
 
     def __init__(self, folder: Path, plan: Plan, order: NDArray[np.int64] | None = None) -> None:
-        """Begin it, or go on where an earlier run of the same plan was killed.
+        """Begin a run, or go on with a killed run of the same plan.
 
-        order  (rows,) the row of the result at each place of the parts, each row once; None: as they are. The plan's
-               ``made_of`` must tell two orders apart
+        order  (rows,) the row of the result at each place of the parts; None: the same. ``made_of`` of the plan must
+               depend on it
 
-        Raises ``ValueError`` where the folder is of another plan, and says what differs.
+        Raises ``ValueError`` if the folder is that of another plan, and says what differs.
         """
         self.folder, self.plan, self.order = folder, plan, order
         self._manifest = json.dumps(asdict(plan), indent=1, sort_keys=True).encode()
@@ -100,10 +99,10 @@ class Parts:
         return [part for part in range(self.plan.parts) if self._read(part) is None]
 
     def complete(self, compute: Callable[[list[int]], Computed], unit: str, progress: bool) -> None:
-        """Compute the parts that are missing, and write each as it comes: those written stay, whatever ends the rest.
+        """Compute the missing parts and write each when it is done; what is written stays, whatever ends the rest.
 
-        compute   makes a generator of the numbers and values of the parts that it is given, in any order
-        unit      the name of a row, for a bar of the rows that are done where ``progress`` and a terminal shows it
+        compute   yields number and values of each of the given parts, in any order
+        unit      the name of a row in the progress bar
         """
         missing = self.missing()
         with progress_bar(self.plan.rows, unit, progress) as update, closing(compute(missing)) as computed:
@@ -126,11 +125,11 @@ class Parts:
         write_atomically(self._path(part), lambda file: file.write(content + self._digest(part, content)))
 
     def read(self, part: int) -> NDArray[Any]:
-        """The values of a part. Raises ``OSError`` where it is absent."""
+        """The values of a part. Raises ``OSError`` if it is absent."""
         return np.frombuffer(self._whole(part), self.plan.dtype).reshape(self.plan.shape(self.plan.length(part)))
 
     def join(self, path: Path) -> None:
-        """Write the result as ``.npy``, some of it at a time. Raises ``OSError`` where a part is absent."""
+        """Write the result as ``.npy``, block by block. Raises ``OSError`` if a part is absent."""
         write_atomically(path, self._join)
 
     def joined(self) -> NDArray[Any]:
@@ -141,7 +140,7 @@ class Parts:
         return values
 
     def count(self, value: float) -> int:
-        """The number of values, in all parts, that are this one."""
+        """How many values of the result equal this one."""
         return sum(int(np.count_nonzero(self.read(part) == value)) for part in range(self.plan.parts))
 
     def remove(self) -> None:
@@ -157,7 +156,7 @@ class Parts:
             file.write(values.tobytes())
 
     def _reordered(self, order: NDArray[np.int64]) -> Iterator[NDArray[Any]]:
-        """The result's rows, as many at a time as are little memory; parts are read again for each."""
+        """The result in blocks of little memory; all parts are read for each block."""
         row = max(1, self.plan.width) * np.dtype(self.plan.dtype).itemsize
         most = max(1, _MOST_BYTES // row)
         for first in range(0, self.plan.rows, most):
@@ -172,11 +171,11 @@ class Parts:
     def _whole(self, part: int) -> bytes:
         content = self._read(part)
         if content is None:
-            raise OSError(f"{self._path(part)}: expected a part of the run, got none that is whole")
+            raise OSError(f"{self._path(part)}: expected a whole part of the run, got none")
         return content
 
     def _read(self, part: int) -> bytes | None:
-        """A part's values, None where it is absent or not what was written."""
+        """The values of a part; None if it is absent or damaged."""
         try:
             content = self._path(part).read_bytes()
         except FileNotFoundError:

@@ -1,4 +1,4 @@
-"""A picture as a run: bands of its rows, each rendered by itself and kept on disk until all are done."""
+"""A picture as a run: bands of its rows, kept on disk until all are rendered."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""A study as a record that can be stored, sent and repeated, and its run, part by part."""
+"""A study as a record that can be stored and sent, and its run, part by part."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,49 +16,91 @@ from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.studies.ambient import ambient_occlusion
+from renderer.studies.places import FacePoints
 from renderer.studies.points import Points
 from renderer.studies.share import check_request
 from renderer.studies.sky import sky_view_factor, sun_hours
 from renderer.system.files import check_writable
 
 Floats = NDArray[np.float64]
-# Points of a part: with 145 directions some seconds of work on one thread, which is what a kill loses at most.
+# Points of a part: some seconds of work on one thread at 145 directions, which a kill loses at most.
 PART = 1 << 15
 
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """A question to each of many points.
+    """What is computed for each of many points, as a record that can be stored, sent and repeated.
 
-    kind        "sky": sky view factor; "sun": hours of sun; "ao": ambient occlusion
-    options     the keyword arguments of the kind's function, other than points, threads and progress
+    Parameters
+    ----------
+    kind : {"sky", "sun", "ao"}
+        `sky_view_factor`, `sun_hours` or `ambient_occlusion` of ``renderer.studies``.
+    options : dict, optional
+        Keyword arguments of that function, without points, normals, ``leaving``, ``threads`` and ``progress``.
+
+    Raises
+    ------
+    ValueError
+        If the kind is unknown.
+
+    Examples
+    --------
+    >>> from renderer.cluster import Study
+    >>> Study("sky", {"patches": 577})
+    Study(kind='sky', options={'patches': 577})
     """
 
     kind: str
-    options: dict[str, Any]
+    options: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         expect(self.kind in KINDS, "kind", f"one of {list(KINDS)}", repr(self.kind))
 
-    def evaluate(self, octree: Octree, points: Points, threads: int | None = None) -> Floats:
-        """The answers (n,) for points; each is the same whatever other points are evaluated with it."""
+    def evaluate(self, octree: Octree, points: FacePoints | Points, threads: int | None = None) -> Floats:
+        """The result of each point, on this machine.
+
+        Parameters
+        ----------
+        octree : Octree
+        points : FacePoints
+            Such as those of ``studies.face_points``.
+        threads : int, optional
+            By default those of the octree.
+
+        Returns
+        -------
+        ndarray of float64, shape (n,)
+            The result of a point does not depend on the other points.
+
+        Examples
+        --------
+        >>> from renderer import Octree
+        >>> from renderer.cluster import Study
+        >>> from renderer.mesh.shapes import box
+        >>> from renderer.studies import face_points
+        >>> octree = Octree.from_mesh(box())
+        >>> Study("ao").evaluate(octree, face_points(octree.mesh)).min()
+        np.float64(1.0)
+        """
+        places = Points(*points) if isinstance(points, FacePoints) else points
         return KINDS[self.kind](
-            octree, points.points, points.normals, leaving=points.leaving, threads=threads, **self.options
+            octree, places.points, places.normals, leaving=places.leaving, threads=threads, **self.options
         )
 
-    def plan(self, mesh: Mesh, points: Points, order: NDArray[np.int64], size: int = PART) -> Plan:
-        """The study in parts of ``size`` points in an order, with all that the bits of each part depend on."""
-        options = {name: _written(value) for name, value in self.options.items()}
-        made_of = {
-            "kind": self.kind, "options": options, "mesh": digest_of(mesh.vertices, mesh.faces),
-            "points": digest_of(points.points, points.normals, points.leaving), "order": digest_of(order),
-            "version": sys.modules["renderer"].__version__,
-        }  # fmt: skip
-        return Plan(len(points), size, 0, "<f8", made_of)
+
+def plan_of(study: Study, mesh: Mesh, points: Points, order: NDArray[np.int64], size: int = PART) -> Plan:
+    """The study in parts of ``size`` points in an order, with all that the bits of each part depend on."""
+    options = {name: _written(value) for name, value in study.options.items()}
+    made_of = {
+        "kind": study.kind, "options": options, "mesh": digest_of(mesh.vertices, mesh.faces),
+        "points": digest_of(points.points, points.normals, points.leaving), "order": digest_of(order),
+        "version": sys.modules["renderer"].__version__,
+    }  # fmt: skip
+    return Plan(len(points), size, 0, "<f8", made_of)
 
 
 def _written(option: Any) -> Any:
-    """An option as a plan has it, in types that JSON has: an array by its digest, and so the arrays of a list."""
+    """An option in types of JSON: arrays, also those in lists, by their digests."""
     if isinstance(option, np.ndarray):
         return digest_of(option)
     if isinstance(option, list | tuple):
@@ -70,29 +112,28 @@ KINDS: dict[str, Callable[..., Floats]] = {"sky": sky_view_factor, "sun": sun_ho
 
 
 def folder_of(output: Path) -> Path:
-    """The folder of the parts of a result that is under way."""
+    """The folder for the parts of a result."""
     return output.with_name(f"{output.name}.parts")
 
 
 def parts_of(octree: Octree, study: Study, points: Points, folder: Path, size: int | None = None) -> Parts:
-    """The parts of a study in a folder, new ones or those that a killed run left: points that lie together are one.
+    """The parts of a study in a folder, new or left by a killed run. The points of a part lie together.
 
-    Raises ``ValueError`` for points, normals or faces that no study takes, naming argument and row, for options that
-    its kind refuses, and for the folder of another study.
+    Raises ``ValueError`` for bad points, normals, faces or options, and for the folder of another study.
     """
-    # Here, as an error of a part would name its own row.
+    # All at once, as an error in a part would name the row in that part.
     check_request(octree, points.points, points.normals, points.leaving, None, False)
-    # Of no point, so that options that the kind refuses leave no folder, which would stand in the way of right ones.
+    # Without points, so that bad options leave no folder, which would then refuse good ones.
     study.evaluate(octree, points.part(slice(0)))
     order = points.order()
-    plan = study.plan(octree.mesh, points, order, *(() if size is None else (size,)))
+    plan = plan_of(study, octree.mesh, points, order, *(() if size is None else (size,)))
     return Parts(folder, plan, order)
 
 
 def run(octree: Octree, study: Study, points: Points, folder: Path, *, progress: bool = False) -> Parts:
-    """Compute the parts that ``folder`` lacks, one after the other; a run that is killed can be begun again.
+    """Compute the parts that ``folder`` lacks, one after the other. The same call goes on with a killed run.
 
-    Returns all parts, whose bits do not depend on how often the run was killed, nor on threads.
+    Returns all parts. Their bits depend neither on threads nor on kills.
     """
     check_writable(folder.with_name(f"{folder.name}.try"))
     parts = parts_of(octree, study, points, folder)

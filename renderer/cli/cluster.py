@@ -1,4 +1,4 @@
-"""``--cluster``: the option of commands that run on Dask, the cluster that it names, and pictures on it."""
+"""``--cluster``: the option, the cluster that it names, and pictures on it."""
 
 import argparse
 import logging
@@ -10,8 +10,8 @@ from renderer.errors import expect
 from renderer.system.terminal import say
 
 _CLUSTER = (
-    "on the Dask cluster of a scheduler's address, or without one (or local) on one here, a worker a processor; parts "
-    "are kept beside the output, and the same command goes on where one was killed"
+    "run on the Dask cluster of the scheduler at ADDRESS; without ADDRESS, or with 'local', on a local cluster with a "
+    "worker for each processor"
 )
 
 

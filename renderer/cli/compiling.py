@@ -16,20 +16,22 @@ def add_compile(commands: Any) -> None:
     """Add the command to a parser's ``commands``."""
     ahead = commands.add_parser(
         "compile",
-        help="compile kernels now, for CI, container images and folders that travel",
-        description="Compile kernels now, so that no later run of these versions has to.",
-        epilog=f"A folder made with -o is found by {AHEAD_VARIABLE}=FOLDER, and never written by a run.",
+        help="compile all kernels now",
+        description="Compile kernels now, so that later runs do not wait: for CI, container images and copied folders.",
+        epilog=f"Runs with {AHEAD_VARIABLE}=FOLDER in the environment use the kernels of a folder made with -o.",
     )
     what = ahead.add_mutually_exclusive_group()
     for name, does in (
-        ("queries", "what an Octree and a BruteForce call"),
-        ("pictures", "the same, and what renders pictures"),
-        ("all", "the same, and what the viewer calls; the default"),
+        ("queries", "kernels of Octree, BruteForce and studies"),
+        ("pictures", "those, and kernels that render pictures"),
+        ("all", "those, and kernels of the viewer (default)"),
     ):
         what.add_argument(f"--{name}", dest="what", action="store_const", const=name, help=does)
-    ahead.add_argument("--level", choices=LEVELS, help="for any processor of a level, not this machine's; needs -o")
-    ahead.add_argument("-o", "--output", type=Path, metavar="FOLDER", help="keep them there and not in the usual cache")
-    ahead.add_argument("--quiet", action="store_true", help="no progress bar and no word at the end")
+    ahead.add_argument("--level", choices=LEVELS, help="for all processors of this level; needs -o")
+    ahead.add_argument(
+        "-o", "--output", type=Path, metavar="FOLDER", help="write kernels to this folder, not to the cache"
+    )
+    ahead.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
     ahead.set_defaults(command=_compile, what="all")
 
 
@@ -51,7 +53,7 @@ def _compile(options: argparse.Namespace) -> None:
 
         compile_ahead(options.what, began)
     if lost():
-        raise OSError(f"{lost()} kernels were compiled but could not be kept: {options.output or 'no cache folder'}")
+        raise OSError(f"{lost()} kernels were compiled but could not be saved: {options.output or 'no cache folder'}")
     if not options.quiet:
         where = f"; {stored_in(options.output)} kernels in {options.output}" if options.output else ""
         say(f"compiled in {compile_seconds():.1f} s{where}")

@@ -3,16 +3,16 @@
 import argparse
 from typing import Any
 
-from renderer.cli.scene import add_scene
+from renderer.cli.scene import SPLIT, add_scene
 from renderer.errors import expect
 from renderer.system.terminal import say
 
 
 def add_info(commands: Any) -> None:
     """Add the command to a parser's ``commands``."""
-    info = commands.add_parser("info", help="say what a scene holds and what its octree looks like")
-    add_scene(info, written=False)
-    info.add_argument("--split", choices=("midpoint", "sah"), default="midpoint")
+    info = commands.add_parser("info", help="list what a scene holds, and its octree")
+    add_scene(info, shown=False)
+    info.add_argument("--split", choices=("midpoint", "sah"), default="midpoint", help=SPLIT)
     info.set_defaults(command=_info)
 
 

@@ -3,6 +3,7 @@
 import argparse
 import logging
 import sys
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
@@ -26,7 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if arguments is None:
             spell_everything()
             _hide_scipy_from_numba()
-        with compile_notices(getattr(options, "quiet", False)):
+        with compile_notices(getattr(options, "quiet", False)), _short_warnings():
             options.command(options)
         flush_output()
     except BrokenPipeError:
@@ -40,9 +41,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _hide_scipy_from_numba() -> None:
-    """Spare the command's own process SciPy, which Numba imports and no kernel calls.
+    """Keep Numba from importing SciPy, which no kernel calls.
 
-    It takes time, and where memory is scarce its OpenBLAS waits for memory without end, deaf to signals.
+    The import takes time, and where memory is scarce its OpenBLAS waits for ever and ignores signals.
     """
     if "scipy" not in sys.modules:
         sys.modules["scipy"] = None  # type: ignore[assignment]  # so the import statement finds none
@@ -55,7 +56,7 @@ def _hide_scipy_from_numba() -> None:
 
 @contextmanager
 def compile_notices(silent: bool) -> Iterator[None]:
-    """Say on standard error that kernels are compiled, so that the first run is not taken for a usual one."""
+    """Print the notices of compilation on standard error."""
     log, notices = logging.getLogger("renderer.jit"), _Notices()
     level, propagate = log.level, log.propagate
     log.addHandler(notices)
@@ -67,6 +68,14 @@ def compile_notices(silent: bool) -> Iterator[None]:
         log.removeHandler(notices)
         log.propagate = propagate
         log.setLevel(level)
+
+
+@contextmanager
+def _short_warnings() -> Iterator[None]:
+    """Warnings as one line each, without the place in the source that they come from."""
+    with warnings.catch_warnings():
+        warnings.showwarning = lambda message, *_place: print(f"octree-render: {one_line(message)}", file=sys.stderr)
+        yield
 
 
 class _Notices(logging.Handler):

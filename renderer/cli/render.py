@@ -9,14 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from renderer.cli.cluster import add_cluster, render_on_cluster
-from renderer.cli.scene import add_scene, write_scene_of
+from renderer.cli.scene import SPLIT, add_scene, say_up, write_scene_of
 from renderer.errors import expect
 from renderer.system.terminal import say
 
 _CHANGE = (
-    "camera, lights, materials or keys of render in place of the file's, such as 'render.shadows = false', or objects "
-    'to leave out, such as \'hide = ["objects.0", "floor"]\'; may be given again'
+    "replace the camera, the lights, materials or keys of render, such as 'render.shadows = false', or leave objects "
+    'out, such as \'hide = ["objects.0", "floor"]\'; may be given again'
 )
+_ACCELERATOR = "default: auto, the octree unless there are very few faces; brute tests all faces"
 
 
 def add_render(commands: Any) -> None:
@@ -25,25 +26,28 @@ def add_render(commands: Any) -> None:
     add_scene(render)
     formats = ".png, or .exr or .npy for linear radiance"
     render.add_argument("-o", "--output", type=Path, default=Path("out.png"), help=formats)
-    render.add_argument("--resolution", type=resolution, metavar="WxH", help="pixels, such as 512x512")
+    render.add_argument(
+        "--resolution", type=resolution, metavar="WxH", help="pixels, such as 640x360; one number is both"
+    )
     render.add_argument("--max-depth", type=int, metavar="N", help="bounces, 0 to 64")
-    render.add_argument("--samples", type=int, metavar="N", help="samples a pixel: 1, 4, 9, ...")
-    render.add_argument("--min-weight", type=float, metavar="W", help="end rays that weigh less")
-    render.add_argument("--max-rays", type=int, metavar="N", help="rays of a sample of a pixel after which it is cut")
+    render.add_argument("--samples", type=int, metavar="N", help="samples per pixel: 1, 4, 9, ...")
+    render.add_argument("--min-weight", type=float, metavar="W", help="end rays whose weight is less")
+    render.add_argument("--max-rays", type=int, metavar="N", help="the most rays per sample of a pixel")
     render.add_argument("--change", action="append", default=[], metavar="TOML", help=_CHANGE)
-    render.add_argument("--accelerator", choices=("auto", "octree", "brute"), default="auto")
-    render.add_argument("--split", choices=("midpoint", "sah"), default="midpoint", help="how the octree is cut")
+    render.add_argument("--accelerator", choices=("auto", "octree", "brute"), default="auto", help=_ACCELERATOR)
+    render.add_argument("--split", choices=("midpoint", "sah"), default="midpoint", help=SPLIT)
     render.add_argument("--threads", type=int, metavar="N", help="default: all processors")
     add_cluster(render)
-    render.add_argument("--quiet", action="store_true", help="no progress bar, no summary and no word of compiling")
+    render.add_argument("--quiet", action="store_true", help="no progress bar, no summary, no notices")
     render.set_defaults(command=_render)
 
 
 def resolution(text: str) -> tuple[int, int]:
-    """Width and height of the text WxH."""
-    width, _, height = text.lower().partition("x")
+    """Width and height of the text WxH; one number is both."""
+    width, x, height = text.lower().partition("x")
+    height = height if x else width
     if not (width.isdecimal() and height.isdecimal()):
-        raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT such as 512x512, got {text!r}")
+        raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT such as 640x360, or one number, got {text!r}")
     return int(width), int(height)
 
 
@@ -75,7 +79,7 @@ def _scene(options: argparse.Namespace) -> Any:
     from renderer.scene.change import changed
     from renderer.scene.scene import load_scene
 
-    scene = load_scene(options.scene)
+    scene = load_scene(options.scene, up=options.up)
     _check_output_is_no_input(options, scene)  # nor one of an object that a change hides
     for text in options.change:
         try:
@@ -83,11 +87,13 @@ def _scene(options: argparse.Namespace) -> Any:
         except ValueError as error:
             raise ValueError(f"--change: {error}") from None
     write_scene_of(options)
+    if not options.quiet:
+        say_up(options.scene, options.up)
     return scene
 
 
 def _rendered_here(scene: Any, asked: dict[str, Any], options: argparse.Namespace) -> Any:
-    """The picture, by this machine."""
+    """The picture, rendered on this machine."""
     from renderer.picture.image import CutWarning
     from renderer.picture.render import render
     from renderer.precompile import compile_in_two
@@ -98,7 +104,7 @@ def _rendered_here(scene: Any, asked: dict[str, Any], options: argparse.Namespac
 
 
 def _summary(image: Any, options: argparse.Namespace) -> str:
-    """The line about a picture that is written."""
+    """The summary of a written picture."""
     height, width = image.rays.shape
     rays = int(image.rays.sum())
     # On a cluster a run may have found parts of an earlier one, and workers built their trees meanwhile.
@@ -111,7 +117,7 @@ def _summary(image: Any, options: argparse.Namespace) -> str:
 
 
 def _check_output_is_no_input(options: argparse.Namespace, scene: Any) -> None:
-    """Refuse to write the picture over a file that it is made of, whatever links lead there."""
+    """Refuse to write the picture over one of its inputs, also through links."""
     from renderer.system.files import are_apart
 
     read = [options.scene, *(thing.mesh for thing in scene.objects if isinstance(thing.mesh, Path))]
@@ -121,7 +127,7 @@ def _check_output_is_no_input(options: argparse.Namespace, scene: Any) -> None:
 
 
 def _save(image: Any, path: Path) -> None:
-    """Save a picture; where that fails after all its work, keep it elsewhere and raise an error that says where."""
+    """Save a picture. If that fails, save it in a temporary folder and raise an error with its path."""
     try:
         image.save(path)
     except (OSError, MemoryError) as error:

@@ -2,23 +2,37 @@
 
 import argparse
 import os
+import sys
 from pathlib import Path
 
 from renderer.errors import expect
 
-_SCENE = "a scene file (.toml), or a mesh file (.ply, .obj, .stl, .glb): camera, light and floor are then chosen to fit"
-_WRITE_SCENE = "of a mesh file: write the scene chosen for it, to be changed at will"
+SPLIT = "the rule that cuts cells of the octree (default: midpoint)"
+_SCENE = "a scene file (.toml), or a mesh file (.ply, .obj, .stl, .glb), which gets a camera, lights and a floor"
+_UP = "the axis of a mesh file that points up (default: y); a scene file has the key up"
+_WRITE_SCENE = "with a mesh file: write its scene to a new .toml file, which you can change"
 
 
-def add_scene(command: argparse.ArgumentParser, *, written: bool = True) -> None:
-    """Add the argument to a command, and unless ``written`` is False the option."""
+def add_scene(command: argparse.ArgumentParser, *, shown: bool = True) -> None:
+    """Add the argument to a command, and where a scene is ``shown`` the options for mesh files."""
     command.add_argument("scene", type=Path, help=_SCENE)
-    if written:
+    if shown:
+        command.add_argument("--up", choices=("x", "y", "z"), help=_UP)
         command.add_argument("--write-scene", type=Path, metavar="FILE", help=_WRITE_SCENE)
 
 
+def say_up(scene: Path, up: str | None) -> None:
+    """Say on standard error which axis is taken for up, where neither the user nor the file says it."""
+    from renderer.mesh.load import MESH_SUFFIXES
+
+    suffix = scene.suffix.lower()
+    if up is None and suffix in MESH_SUFFIXES and suffix != ".glb":
+        line = f"{scene} does not say which axis points up: y was taken; --up x|y|z changes it"
+        print(f"octree-render: {line}", file=sys.stderr)
+
+
 def write_scene_of(options: argparse.Namespace) -> None:
-    """Write the scene of a mesh file where that is asked for."""
+    """Write the scene of a mesh file, if ``--write-scene`` names a file."""
     from renderer.mesh.load import MESH_SUFFIXES
     from renderer.scene.scene import write_scene
 
@@ -28,4 +42,4 @@ def write_scene_of(options: argparse.Namespace) -> None:
         # It may have been changed since it was written.
         new = not os.path.lexists(options.write_scene)
         expect(new, "--write-scene", "a new file", f"{options.write_scene}, which is there already")
-        write_scene(options.scene, options.write_scene)
+        write_scene(options.scene, options.write_scene, options.up)

@@ -1,7 +1,6 @@
-"""Studies, pictures and ray queries on a Dask cluster: the mesh goes to each worker once, and the tree is built there.
+"""Studies, pictures and ray queries on a Dask cluster.
 
-``pip install '.[cluster]'`` in a checkout installs what it needs. The functions are those of ``__init__.pyi``, imported
-when they are first used.
+Each worker gets the mesh once and builds the tree. ``pip install '.[cluster]'`` in a checkout installs Dask.
 """
 
 from renderer.lazy_names import attach_stub as _attach_stub

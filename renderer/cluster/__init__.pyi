@@ -1,3 +1,4 @@
+from ..checkpoints.study import Study as Study
 from .clients import connected as connected
 from .pictures import frames_on as frames_on
 from .pictures import render_on as render_on

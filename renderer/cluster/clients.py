@@ -15,12 +15,30 @@ SECONDS = 10
 
 @contextmanager
 def connected(address: str | None = None, *, workers: int | None = None) -> Iterator[Any]:
-    """A ``distributed.Client`` of the scheduler at ``address`` ("tcp://host:8786"), or of a local cluster, which ends
-    with the block: ``workers`` processes of one thread each, by default one for each processor.
+    """A ``distributed.Client`` of a running cluster, or of a local one that ends with the ``with`` block.
 
-    Raises ``ImportError`` where the extra is not installed, ``ValueError`` for what is no address and for workers of a
-    cluster that runs already, and ``OSError`` where no scheduler answers.
+    Parameters
+    ----------
+    address : str, optional
+        The scheduler's address, such as ``"tcp://host:8786"``. By default a local cluster is started.
+    workers : int, optional
+        The processes of a local cluster, of one thread each. By default one for each processor.
 
+    Yields
+    ------
+    distributed.Client
+
+    Raises
+    ------
+    ImportError
+        If the extra ``cluster`` is not installed.
+    ValueError
+        If `address` is no address, or if `workers` are given for a cluster that runs already.
+    OSError
+        If no scheduler answers.
+
+    Examples
+    --------
     >>> from renderer.cluster import connected
     >>> with connected(workers=1) as client:
     ...     len(client.scheduler_info()["workers"])

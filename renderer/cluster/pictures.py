@@ -35,17 +35,44 @@ def render_on(
     progress: bool = False,
     **options: Any,
 ) -> PictureRun:
-    """``renderer.render`` on the workers of ``client``, a ``distributed.Client``: bands of rows as parts in ``folder``.
+    """A picture that is rendered on a cluster in bands of rows, with the bits of ``renderer.render``.
 
-    band     rows of a part; None chooses. It changes no bit
-    options  ``accelerator``, ``split``, ``offset``, ``media``, ``planes`` and the settings, as ``render`` takes them
+    Parameters
+    ----------
+    client : distributed.Client
+        See `connected`.
+    scene : Scene
+        It is sent to each worker once.
+    folder : str or Path
+        For finished bands: a new folder, or that of a run that was killed, whose bands are kept.
+    camera : PerspectiveCamera or OrthographicCamera, optional
+        By default that of the scene.
+    band : int, optional
+        Rows of a band. It changes no bit. By default it is chosen.
+    progress : bool, default False
+        Show a bar on standard error if that is a terminal.
+    **options
+        ``accelerator``, ``split``, ``offset``, ``media``, ``planes`` and the settings, as for ``renderer.render``.
 
-    Returns the run, whose ``image()`` is the picture and whose ``remove()`` removes the folder, to be called when the
-    picture is saved. The scene goes to each worker once. Parts that a killed run left are not rendered again, and a
-    worker that dies loses its parts under way, which others render: the bits are those of ``render``. Raises
-    ``ValueError`` naming the argument, or where the folder is of another picture, and ``OSError`` where the scheduler
-    is gone, or without a worker for 10 seconds; the same call then goes on.
+    Returns
+    -------
+    PictureRun
+        ``image()`` is the picture. ``remove()`` removes the folder; call it when the picture is saved.
 
+    Raises
+    ------
+    ValueError
+        If an argument is not as above, or if `folder` is that of another picture.
+    OSError
+        If the scheduler is gone, or has had no worker for 10 seconds. The same call then goes on where this one
+        stopped.
+
+    Notes
+    -----
+    If a worker dies, others render its bands.
+
+    Examples
+    --------
     >>> from tempfile import TemporaryDirectory
     >>> from renderer import Mesh, PerspectiveCamera, Phong, Scene, SceneObject
     >>> from renderer.cluster import connected, render_on
@@ -77,17 +104,37 @@ def frames_on(
     progress: bool = False,
     **options: Any,
 ) -> None:
-    """Render the frames of an animation, each to its own of the files ``outputs``, as ``render_on`` does one picture.
+    """Render the frames of an animation on a cluster, each to its own file.
 
-    scenes   one for each output, read when their turn comes; those that differ in the camera alone, as
-             ``scene.altered(camera=...)`` makes them, are sent once. A list of more or fewer is refused before anything
-             is written
-    outputs  .png, .exr or .npy, as ``Image.save`` writes them
-    folder   for parts of frames under way, and what frames are done: the same call goes on where one was killed, and
-             renders no frame again whose file is what it wrote. It is removed when all are done
+    Parameters
+    ----------
+    client : distributed.Client
+        See `connected`.
+    scenes : iterable of Scene
+        One for each output, read when it is its turn. Scenes that differ only in the camera, such as those of
+        ``scene.altered(camera=...)``, are sent once.
+    outputs : sequence of str or Path
+        .png, .exr or .npy files, as ``Image.save`` writes them.
+    folder : str or Path
+        For finished bands. It also says which frames are done, so the same call goes on where a killed one stopped.
+        It is removed when all frames are done.
+    band, progress, **options
+        As for `render_on`.
 
-    Frames are worked on together, so that no worker waits for the last part of one. Errors are those of ``render_on``.
+    Raises
+    ------
+    ValueError
+        If an argument is not as above, or if `folder` is that of other frames.
+    OSError
+        If the scheduler is gone, or has had no worker for 10 seconds. The same call then goes on where this one
+        stopped.
 
+    Notes
+    -----
+    Workers render several frames at once, so none waits for the last band of a frame.
+
+    Examples
+    --------
     >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
     >>> from renderer import load_scene

@@ -17,20 +17,34 @@ HIT = np.dtype([("t", "f8"), ("face", "i8"), ("u", "f8"), ("v", "f8")])
 
 
 def closest_hit(octree: Octree, origins: Any, directions: Any, *, t_min: float = 0.0, t_max: float = np.inf) -> Any:
-    """The closest hits of rays in dask arrays, a dask array (n,) of the records ``HIT`` with the chunks of the rays.
+    """The closest hits of rays in dask arrays, lazily.
 
-    origins, directions  (n, 3) dask arrays; the origins' chunks of rows are kept
-    t_min, t_max         numbers for all rays
+    Parameters
+    ----------
+    octree : Octree
+    origins, directions : dask.array.Array, shape (n, 3)
+        The result has the chunks of the origins.
+    t_min, t_max : float, default 0, inf
+        The range of t in which hits count, in units of the directions' lengths; one for all rays.
 
-    Nothing is computed before the result is asked for; ``hits["t"]`` is lazy too. The bits are those of
-    ``octree.closest_hit``. Raises ``ValueError`` for other shapes; a ray that is out of range raises when its chunk
-    is computed.
+    Returns
+    -------
+    dask.array.Array, shape (n,)
+        Records with the fields ``t``, ``face``, ``u`` and ``v``: inf, -1 and nan if a ray hits nothing. A field such as
+        ``hits["t"]`` is lazy, too. The bits are those of ``Octree.closest_hit``.
 
+    Raises
+    ------
+    ValueError
+        If an argument is not as above. Rays out of range raise when their chunk is computed.
+
+    Examples
+    --------
     >>> import dask.array as da
     >>> from renderer import Octree
     >>> from renderer.cluster import closest_hit
     >>> floor = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-    >>> origins, directions = da.from_array([[0.25, 0.25, 2.0], [9, 9, 2]]), da.from_array([[0.0, 0, -1], [0, 0, -1]])
+    >>> origins, directions = da.array([[0.25, 0.25, 2.0], [9, 9, 2]]), da.array([[0.0, 0, -1], [0, 0, -1]])
     >>> closest_hit(floor, origins, directions)["t"].compute()
     array([ 2., inf])
     """
@@ -46,13 +60,31 @@ def closest_hit(octree: Octree, origins: Any, directions: Any, *, t_min: float =
 
 
 def any_hit(octree: Octree, origins: Any, directions: Any, *, t_min: float = 0.0, t_max: float = np.inf) -> Any:
-    """Whether each ray hits anything, a dask array (n,) of bool: arguments, bits and errors as of ``closest_hit``.
+    """Whether each of the rays in dask arrays hits anything, lazily.
 
+    Parameters
+    ----------
+    octree : Octree
+    origins, directions : dask.array.Array, shape (n, 3)
+    t_min, t_max : float, default 0, inf
+        As for `closest_hit`.
+
+    Returns
+    -------
+    dask.array.Array of bool, shape (n,)
+
+    Raises
+    ------
+    ValueError
+        As for `closest_hit`.
+
+    Examples
+    --------
     >>> import dask.array as da
     >>> from renderer import Octree
     >>> from renderer.cluster import any_hit
     >>> floor = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-    >>> origins, directions = da.from_array([[0.25, 0.25, 2.0], [9, 9, 2]]), da.from_array([[0.0, 0, -1], [0, 0, -1]])
+    >>> origins, directions = da.array([[0.25, 0.25, 2.0], [9, 9, 2]]), da.array([[0.0, 0, -1], [0, 0, -1]])
     >>> any_hit(floor, origins, directions).compute()
     array([ True, False])
     """

@@ -13,6 +13,7 @@ from renderer.cluster.workers import SentMesh, evaluate_part
 from renderer.errors import expect
 from renderer.octree import Octree
 from renderer.picture.render import check_tree
+from renderer.studies.places import FacePoints
 from renderer.studies.points import Points
 from renderer.system.files import as_path
 
@@ -21,38 +22,65 @@ def run_on(
     client: Any,
     octree: Octree,
     study: Study,
-    points: Points,
+    points: FacePoints | Points,
     folder: str | Path,
     *,
     size: int = PART,
     split: Literal["midpoint", "sah"] = "midpoint",
     progress: bool = False,
 ) -> Parts:
-    """``renderer.checkpoints.study.run`` on the workers of ``client``, a ``distributed.Client``.
+    """The parts of a study that is computed on a cluster, with the bits of a run on this machine.
 
-    points  where, as ``renderer.studies.points`` makes them
-    folder  for the parts, a new one or that of a run that was killed; the caller removes it
-    size    points of a part at least. It changes no bit
-    split   the tree that workers build, as ``Octree.from_mesh`` takes it. It changes no bit
+    Parameters
+    ----------
+    client : distributed.Client
+        See `connected`.
+    octree : Octree
+        Its mesh is sent to each worker once, which builds the tree.
+    study : Study
+        What is computed.
+    points : FacePoints
+        Where, such as those of ``studies.face_points`` or ``studies.grid_points``.
+    folder : str or Path
+        For finished parts: a new folder, or that of a run that was killed, whose parts are kept. The caller removes
+        it.
+    size : int, default 32768
+        Points of a part. It changes no bit.
+    split : {"midpoint", "sah"}, default "midpoint"
+        How workers build the tree, see ``Octree.from_mesh``. It changes no bit.
+    progress : bool, default False
+        Show a bar on standard error if that is a terminal.
 
-    Returns the parts, whose ``joined()`` is the answer, float64 (n,), one for each point in their order.
+    Returns
+    -------
+    Parts
+        ``joined()`` is the result, float64 (n,), in the order of the points. ``remove()`` removes the folder.
 
-    Parts are written here, whole, as they come; those that a killed run left are not computed again. A worker that dies
-    loses its parts under way, which others compute. The bits are those of a run on this machine alone. Raises
-    ``ValueError`` naming the argument, with the row of a bad point, or where the folder is of another study, and
-    ``OSError`` where the scheduler is gone, or without a worker for 10 seconds; the same call then goes on.
+    Raises
+    ------
+    ValueError
+        If an argument is not as above, or if `folder` is that of another study.
+    OSError
+        If the scheduler is gone, or has had no worker for 10 seconds. The same call then goes on where this one
+        stopped.
 
+    Notes
+    -----
+    If a worker dies, others compute its parts.
+
+    Examples
+    --------
     >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
     >>> from renderer import Octree
-    >>> from renderer.cluster import connected, run_on
-    >>> from renderer.studies.points import on_faces
-    >>> from renderer.checkpoints.study import Study
+    >>> from renderer.cluster import Study, connected, run_on
+    >>> from renderer.studies import face_points
     >>> floor = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     >>> with connected(workers=1) as client, TemporaryDirectory() as folder:
-    ...     run_on(client, floor, Study("sky", {}), on_faces(floor).points, Path(folder) / "parts").joined().tolist()
+    ...     run_on(client, floor, Study("sky"), face_points(floor.mesh), Path(folder) / "parts").joined().tolist()
     [1.0]
     """
+    points = Points(*points) if isinstance(points, FacePoints) else points
     folder = _checked(octree, study, points, folder, size, split)
     mesh = octree.mesh
     parts = parts_of(octree, study, points, folder, size)
@@ -70,7 +98,7 @@ def _checked(octree: object, study: object, points: object, folder: object, size
     """The folder as a path. Raises ``ValueError`` for what a study on a cluster does not take."""
     expect(isinstance(octree, Octree), "octree", "an Octree", type(octree).__name__)
     expect(isinstance(study, Study), "study", "a Study", type(study).__name__)
-    expect(isinstance(points, Points), "points", "Points", type(points).__name__)
+    expect(isinstance(points, Points), "points", "FacePoints", type(points).__name__)
     count_argument("size", size, 1)
     check_tree("octree", split)
     return as_path("folder", folder)

@@ -1,7 +1,7 @@
-"""Tasks on a cluster: few under way at a time, each result as it comes, and what is lost with a worker done again.
+"""Tasks on a cluster: few at a time, results as they come, and again what was lost with a worker.
 
-The data that many tasks share are sent to all workers once. Dask computes tasks again whose worker died, but has no
-copy of data that were on no other worker: these are sent again from here, and all after a scheduler came back.
+Data that tasks share are sent to all workers once. If a worker dies, Dask repeats its tasks, but data that no other
+worker has are lost: they are sent again from here. After a scheduler came back, all are sent again.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ class Task:
 
 
 def results(client: Any, function: Callable[..., Any], tasks: Iterable[Task]) -> Results:
-    """Each task's name and result, as they come; ``client`` is a ``distributed.Client``, ``tasks`` are read as needed.
+    """Name and result of each task, as they come. ``tasks`` are read as needed.
 
-    Raises what a task raises, again and again, and ``OSError`` with one line where the scheduler is gone or no worker
-    is left for 10 seconds. Tasks under way are cancelled at the end, whatever ends it.
+    Raises what a task raises repeatedly, and ``OSError`` if the scheduler is gone or no worker is left for 10 seconds.
+    Whatever ends it, tasks under way are cancelled.
     """
     expect(hasattr(client, "nthreads"), "client", "a distributed.Client", type(client).__name__)
     waiting, crew = iter(tasks), _Crew(client, function)
@@ -71,7 +71,7 @@ class _Crew:
         self._threads, self._looked = 0, float("-inf")
 
     def look(self) -> None:
-        """See how many threads the cluster has, now and then; wait for the first worker, and not for ever."""
+        """Now and then count the threads of the cluster; wait for the first worker, up to a limit."""
         if self._client.status == "running" and time.monotonic() < self._looked + _MOMENT:
             return
         patience = time.monotonic() + clients.SECONDS
@@ -86,7 +86,7 @@ class _Crew:
         return max(0, _AHEAD * self._threads - len(self.under_way))
 
     def submit(self, task: Task) -> None:
-        """Let a worker begin it, when it has time; the data first, unless they are there."""
+        """Queue a task, after its data unless workers have them."""
         sent = self._sent.get(task.shared.digest)
         if sent is None or sent.status != "finished":
             sent = self._send(task.shared)
@@ -94,7 +94,7 @@ class _Crew:
         self.under_way[future] = task
 
     def finished(self) -> Iterator[tuple[Any, Any]]:
-        """Wait a moment for tasks to end, and give the results of those that did; what was lost begins again."""
+        """Wait a moment and yield the results of finished tasks; lost tasks start again."""
         from distributed import wait
 
         # Of tasks that were cancelled, no scheduler, or nothing within the moment: each future's status says more.
@@ -113,9 +113,9 @@ class _Crew:
         self._forget()
 
     def dismiss(self) -> None:
-        """Let go of what is under way and of what was sent, which Dask then cancels and drops.
+        """Release tasks and data, so that Dask cancels and drops them.
 
-        An error's traceback may hold it for longer, so it is released by name.
+        Explicitly, as the traceback of an error may hold them for longer.
         """
         for future in [*self.under_way, *self._sent.values()]:
             with suppress(Exception):  # of a client that is closed
@@ -124,7 +124,7 @@ class _Crew:
         self._sent.clear()
 
     def _result(self, future: Any) -> tuple[bool, Any]:
-        """Whether there is a result, and the result; there is none where it was lost. Raises what the task raised."""
+        """Whether there is a result, and the result; a lost task has none. Raises what the task raised."""
         from distributed import KilledWorker
 
         raised = future.status == "error"
@@ -141,7 +141,7 @@ class _Crew:
             return False, None
 
     def _send(self, shared: Any) -> Any:
-        """Send data to all workers; the same ones again and again only where workers die."""
+        """Send data to all workers, again if workers die meanwhile."""
         while True:
             times = self._times_sent[shared.digest] = self._times_sent.get(shared.digest, 0) + 1
             if times > 1 + _RETRIES:
@@ -159,14 +159,14 @@ class _Crew:
                 return sent
 
     def _forget(self) -> None:
-        """Let workers drop data that no task under way needs, but the latest."""
+        """Let workers drop data that no task needs, except the latest."""
         needed = {task.shared.digest for task in self.under_way.values()}
         for digest in list(self._sent)[:-1]:
             if digest not in needed:
                 del self._sent[digest]
 
     def _count(self) -> int:
-        """The threads of all workers; 0 where there are none, or no scheduler at the moment."""
+        """The threads of all workers; 0 without workers or scheduler."""
         if self._client.status != "running":
             return 0
         with suppress(OSError):  # that it ends just now

@@ -1,4 +1,4 @@
-"""The meshes and scenes that a worker was sent and keeps, with their trees, which it builds once each."""
+"""The meshes and scenes that a worker keeps, each with the tree that it builds once."""
 
 from __future__ import annotations
 

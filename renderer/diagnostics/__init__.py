@@ -1,1 +1,1 @@
-"""What shows how a picture and a tree come about: paths of rays, boxes, false colours."""
+"""Diagnostics of pictures and trees: paths of rays, boxes, false colours."""

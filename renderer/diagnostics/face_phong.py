@@ -1,4 +1,4 @@
-"""One colour per face, as seen from an eye: Phong at the face's centroid, without shadows and without bounces.
+"""One colour for each face, seen from an eye: Phong at the face's centroid, without shadows and bounces.
 
 k_a I_a + sum over lights [k_d (N.L)+ + k_s (R.V)+^n] I_light, with N the geometric normal that faces the eye.
 """
@@ -7,8 +7,9 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from renderer.arguments.types import ArrayLike
 from renderer.picture.image import srgb, srgb_steps
 from renderer.scene.camera import checked_vector
 from renderer.shade.face_colors import PLACES, shade_faces
@@ -45,10 +46,10 @@ def face_colors(arrays: SceneArrays, eye: ArrayLike, threads: int | None = None)
 
 
 class CodeTable(NamedTuple):
-    """The codes of sRGB as a table: a power for each value would take three times as long as all the rest here.
+    """sRGB codes as a table; computing a power for each value would quadruple the time.
 
     steps  (256,) the least radiance of codes 1 to 255, and an infinity
-    first  (PLACES + 1,) the code at the beginning of each of PLACES equal parts of [0, 1], and at 1
+    first  (PLACES + 1,) the code at the start of each of PLACES equal parts of [0, 1], and at 1
     """
 
     steps: NDArray[np.float64]
@@ -62,7 +63,7 @@ def _code_table() -> CodeTable:
 
 
 def _with_stand_ins(materials: NDArray[np.float64]) -> NDArray[np.float64]:
-    """``materials`` with matte rows in the place of those that have no ambient, diffuse or specular colour."""
+    """``materials`` with matte rows in place of those without ambient, diffuse or specular colour."""
     rows = materials.copy()
     colorless = ~rows[:, AMBIENT:REFLECTANCE].any(axis=1)
     passed_on = np.maximum(rows[:, REFLECTANCE : REFLECTANCE + 3], rows[:, TRANSMITTANCE : TRANSMITTANCE + 3])

@@ -1,23 +1,17 @@
 """The AOVs of a picture drawn as colours: depth, normal, face, and the cost of each pixel."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import expect
+from renderer.mesh.colormaps import VIRIDIS, shades_of, step_of
 from renderer.picture.image import Image, srgb
+
+__all__ = ["AOVS", "VIRIDIS", "false_color", "limits_of", "scale_colors", "shades_of"]
 
 AOVS = "color", "depth", "normal", "face", "cost"
 Limits = tuple[float, float]
 
-# Every seventeenth colour of viridis (Smith and van der Walt, matplotlib 1.5, CC0), whose lightness rises evenly.
-# Straight lines between them stay within 7 of 255 of it in every channel.
-VIRIDIS = np.array([
-    [68, 1, 84], [72, 26, 108], [71, 47, 125], [65, 68, 135], [57, 86, 140], [49, 104, 142], [42, 120, 142],
-    [35, 136, 142], [31, 152, 139], [34, 168, 132], [53, 183, 121], [84, 197, 104], [122, 209, 81], [165, 219, 54],
-    [210, 226, 27], [253, 231, 37],
-], np.uint8)  # fmt: skip
 _STEPS = 256
 # The greys of the nearest and the farthest surface; black and white stay free for backgrounds.
 _NEAR, _FAR = 240, 30
@@ -54,7 +48,7 @@ def false_color(image: Image, aov: str, limits: Limits | None = None, faces: int
     colors[~hit] = srgb(image.radiance[~hit])
     if aov == "depth":
         greys = np.rint(np.linspace(_NEAR, _FAR, _STEPS)).astype(np.uint8)
-        colors[hit] = greys[_steps(image.depth[hit], low, high), None]
+        colors[hit] = greys[step_of(image.depth[hit], low, high), None]
     else:
         colors[hit] = _face_colors(image.face[hit], faces) if aov == "face" else _normal_colors(image.normal[hit])
     return colors
@@ -76,24 +70,6 @@ def scale_colors(aov: str) -> NDArray[np.uint8]:
     if aov == "depth":
         return np.repeat(np.array([[_NEAR], [_FAR]], np.uint8), 3, axis=1)
     return VIRIDIS.copy()
-
-
-def shades_of(values: NDArray[Any], low: float, high: float) -> NDArray[np.uint8]:
-    """The colours (..., 3) of values on a scale, as those of a cost."""
-    return _viridis(_STEPS)[_steps(values, low, high)]
-
-
-def _steps(values: NDArray[Any], low: float, high: float) -> NDArray[np.intp]:
-    """The step of each value on a scale of _STEPS; the first step where the scale has no length."""
-    share = (values - low) / (high - low) if high > low else np.zeros(values.shape)
-    return ((_STEPS - 1) * np.clip(share, 0.0, 1.0) + 0.5).astype(np.intp)
-
-
-def _viridis(count: int) -> NDArray[np.uint8]:
-    """``count`` colours from one end of VIRIDIS to the other, (count, 3)."""
-    places = np.linspace(0.0, len(VIRIDIS) - 1.0, count)
-    channels = [np.interp(places, np.arange(len(VIRIDIS)), VIRIDIS[:, k]) for k in range(3)]
-    return np.rint(np.stack(channels, axis=1)).astype(np.uint8)
 
 
 def _normal_colors(normals: NDArray[np.float32]) -> NDArray[np.uint8]:

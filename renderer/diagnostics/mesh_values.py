@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.diagnostics.false_color import shades_of
 from renderer.errors import expect
+from renderer.mesh.colormaps import colors_of, scale_of, shades_of
 from renderer.mesh.mesh import Mesh
-from renderer.mesh.ply import by_name, format_columns
+from renderer.mesh.ply import by_name
+from renderer.mesh.save import format_valued
 from renderer.picture.encoding import write_pixels
 from renderer.picture.image import Image, write_array
 from renderer.system.files import write_atomically
@@ -19,25 +20,9 @@ Floats = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 # So many times finer than a picture is the image that it is drawn from, along each side.
 FINER = 2
-# What has no value.
-_GREY = 128
 # Of a legend: its share of the picture's height, its least and greatest height in pixels, and the height of a letter's
 # share of it.
 _SHARE, _LEAST, _MOST = 0.06, 28, 60
-
-
-def scale_of(values: Floats) -> tuple[float, float]:
-    """Least and greatest of the values that are numbers; (0, 0) without any."""
-    known = values[np.isfinite(values)]
-    return (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
-
-
-def colors_of(values: Floats, scale: tuple[float, float]) -> Bytes:
-    """(..., 3) sRGB colours: viridis from the scale's low end to its high one; grey where a value is NaN."""
-    colors = np.full((*values.shape, 3), _GREY, np.uint8)
-    known = np.isfinite(values)
-    colors[known] = shades_of(values[known], *scale)
-    return colors
 
 
 def write_ply(path: Path, vertices: Floats, faces: NDArray[np.int32] | None, values: Floats, of_faces: bool) -> None:
@@ -45,45 +30,57 @@ def write_ply(path: Path, vertices: Floats, faces: NDArray[np.int32] | None, val
 
     faces : None for a cloud of points.
     """
-    colors = colors_of(values, scale_of(values))
-    valued = {"value": values, **by_name(("red", "green", "blue"), colors)}
-    points = by_name(("x", "y", "z"), vertices)
-    content = format_columns(points, faces, valued) if of_faces else format_columns(points | valued, faces)
+    content = format_valued(by_name(("x", "y", "z"), vertices), faces, values, of_faces)
     write_atomically(path, lambda file: file.write(content))
 
 
-def draw(image: Image, mesh: Mesh, values: Floats, title: str) -> Bytes:
-    """A picture of the mesh (h, w, 3) from an image ``FINER`` times its size: each place in the colour of its face's
-    value, walls darker, white where nothing is, and a pixel the mean of its places; below it a legend.
+def legend_rows(height: int) -> int:
+    """The rows of the legend of a picture of this height; 0 where it would take more than half of them."""
+    return int(np.clip(_SHARE * height, _LEAST, _MOST)) if height >= 2 * _LEAST else 0
+
+
+def map_size(resolution: tuple[int, int]) -> tuple[int, int]:
+    """Width and height of what is above the legend of a picture of this resolution."""
+    width, height = resolution
+    return width, height - legend_rows(height)
+
+
+def draw(image: Image, mesh: Mesh, values: Floats, title: str, legend_rows: int, up: int = 2) -> Bytes:
+    """A picture of the mesh (h, w, 3) with a legend below.
+
+    image        ``FINER`` times as wide and high as what is above the legend
+    legend_rows  0: no legend
+    up           the axis that points up
+
+    Each place has the colour of its face's value, walls are darker, and it is white where nothing is.
     """
     expect(len(values) == len(mesh.faces), "values", f"{len(mesh.faces)} values", str(len(values)))
     hit, scale = image.face >= 0, scale_of(values)
     canvas = np.full((*hit.shape, 3), 255, np.uint8)
     colors = colors_of(values, scale)[image.face[hit]].astype(np.float64)
     # By the normal's height: walls and ground of the same value are told apart, and the hue stays.
-    light = 0.8 + 0.2 * np.abs(image.normal[hit][:, 2:3])
+    light = 0.8 + 0.2 * np.abs(image.normal[hit][:, up, None])
     canvas[hit] = (colors * light + 0.5).astype(np.uint8)
     tall, wide = canvas.shape[0] // FINER, canvas.shape[1] // FINER
     canvas = (canvas.reshape(tall, FINER, wide, FINER, 3).mean(axis=(1, 3)) + 0.5).astype(np.uint8)
-    return np.concatenate([canvas, legend(canvas.shape[1], canvas.shape[0], scale, title)])
+    return np.concatenate([canvas, legend(wide, legend_rows, scale, title)]) if legend_rows else canvas
 
 
-def legend(width: int, height: int, scale: tuple[float, float], title: str) -> Bytes:
-    """A bar of colours with the scale's ends, its middle and a title, (h, width, 3), for a picture of some height."""
+def legend(width: int, rows: int, scale: tuple[float, float], title: str) -> Bytes:
+    """A bar of colours with the scale's ends and a title, (rows, width, 3)."""
     from PIL import Image as Pillow
     from PIL import ImageDraw, ImageFont
 
-    tall = int(np.clip(_SHARE * height, _LEAST, _MOST))
-    bar = tall // 3
-    strip = np.full((tall, width, 3), 255, np.uint8)
+    bar = rows // 3
+    strip = np.full((rows, width, 3), 255, np.uint8)
     strip[:bar] = (
         shades_of(np.linspace(*scale, width), *scale)
         if scale[1] > scale[0]
         else shades_of(np.full(width, scale[0]), *scale)
     )
     picture = Pillow.fromarray(strip)
-    pen, font = ImageDraw.Draw(picture), ImageFont.load_default(size=0.42 * tall)
-    middle = bar + (tall - bar) / 2
+    pen, font = ImageDraw.Draw(picture), ImageFont.load_default(size=0.42 * rows)
+    middle = bar + (rows - bar) / 2
     ends = [(4, "lm", f"{scale[0]:.4g}"), (width - 4, "rm", f"{scale[1]:.4g}"), (width / 2, "mm", title)]
     for x, anchor, text in ends:
         pen.text((x, middle), text, fill=(0, 0, 0), font=font, anchor=anchor)

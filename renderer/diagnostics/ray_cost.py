@@ -1,4 +1,4 @@
-"""What a picture's camera rays cost: the nodes and triangles that each of them tests."""
+"""The cost of camera rays: the nodes and triangles that each of them tests."""
 
 from collections.abc import Callable
 
@@ -20,8 +20,8 @@ def camera_steps(
 ) -> Steps:
     """The steps of the ray through each pixel's centre, (h, w) each, of a picture of ``size`` (w, h).
 
-    ``finished(share)`` is called with the share of the picture that has been counted since the last call; what it
-    raises ends the counting.
+    ``finished(share)`` is called with the share of the picture counted since the last call. An exception from it ends
+    the counting.
     """
     width, height = size
     rows, steps = camera.rows(width, height), []

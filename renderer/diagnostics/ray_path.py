@@ -1,16 +1,15 @@
-"""The tree of rays that one camera ray spawns, as the Whitted kernel traces it: for looking at, not for speed.
+"""The tree of rays that one camera ray spawns, as the Whitted kernel traces it: for inspection, not for speed.
 
-Surfaces are met and left by the kernel's own functions (``ray_step``), so the rays are the same to the bit, and their
-light adds up to the pixel's.
+Each step uses the kernel's own functions (``ray_step``), so the rays have the same bits, and their light adds up to the
+pixel's.
 """
 
 from collections import deque
 from dataclasses import dataclass
 from typing import Literal
 
-from numpy.typing import ArrayLike
-
 from renderer.arguments.counts import count_argument
+from renderer.arguments.types import ArrayLike
 from renderer.diagnostics.ray_step import Aim, Ray, Steps, SurfaceHit, Vector, color_at, steps_of
 from renderer.errors import expect
 from renderer.numerics.vec3 import add
@@ -86,18 +85,18 @@ def ray_path(
 
 
 def goes_on(weight: Vector, min_weight: float) -> bool:
-    """Whether a ray of this weight is followed."""
+    """Whether a ray of this weight is traced further."""
     return max(weight) > 0.0 and max(weight) >= min_weight
 
 
 def _miss_segment(steps: Steps, ray: Ray, parent: int) -> Segment:
-    """The segment of a ray that met nothing."""
+    """The segment of a ray that misses."""
     end = steps.beyond(ray.origin, ray.direction)
     return Segment(ray.kind, ray.depth, parent, ray.origin, end, False, -1, ray.weight, steps.background(ray))
 
 
 def _hit_segments(steps: Steps, ray: Ray, met: SurfaceHit, parent: int, own: int, shadows: bool) -> list[Segment]:
-    """The segment of a ray that met a surface, in place ``own`` of the path, and those of its shadow rays."""
+    """The segment of a ray that hits a surface, in place ``own`` of the path, and those of its shadow rays."""
     radiance, shadow_rays = steps.ambient(ray, met), []
     for aim in steps.aims(ray, met):
         if shadows:

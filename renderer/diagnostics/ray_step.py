@@ -1,6 +1,6 @@
-"""One step of Whitted's recursion by the kernel's own functions: what a ray meets, and the rays that leave there.
+"""One step of Whitted's recursion by the kernel's own functions: the hit of a ray, and the rays spawned there.
 
-The rays have the bits of those of a picture under the same rules.
+The rays have the same bits as in a picture under the same rules.
 """
 
 from dataclasses import dataclass
@@ -52,9 +52,9 @@ class Ray(NamedTuple):
 
 
 class SurfaceHit(NamedTuple):
-    """What a ray met: t, the faces that are crossed together, the place where they are seen, the surface there, the
-    normal that faces the ray, and the material's row with its columns; and where light passes, the change of media and
-    those beyond.
+    """The hit of a ray: t, the faces crossed together, the place where they are seen, the surface there, the normal
+    that faces the ray, and the material's row with its columns; for transmitted light also the change of media and the
+    media beyond.
     """
 
     t: float
@@ -83,7 +83,7 @@ class Aim(NamedTuple):
 
 @dataclass(frozen=True)
 class Steps:
-    """A prepared scene under rules for offsets and media: make one with ``steps_of``."""
+    """A prepared scene under rules for offsets and media; ``steps_of`` creates it."""
 
     prepared: PreparedScene
     arrays: SceneArrays
@@ -95,14 +95,14 @@ class Steps:
         return Ray("camera", 0, origin, normalized(direction), (1.0, 1.0, 1.0), self._media_at(origin), _NO_START)
 
     def meet(self, ray: Ray) -> SurfaceHit | None:
-        """The nearest surface that the ray meets."""
+        """The nearest surface that the ray hits."""
         hits = self.closest(ray.origin, ray.direction, np.inf, ray.start)
         if not hits.hit[0]:
             return None
         return self.meet_at(ray, Spot(int(hits.face[0]), float(hits.u[0]), float(hits.v[0])), float(hits.t[0]))
 
     def meet_at(self, ray: Ray, spot: Spot, t: float) -> SurfaceHit:
-        """What the ray meets at t, where it hits a face at barycentrics."""
+        """The ``SurfaceHit`` of the ray at t, at barycentrics of a face."""
         d, arrays, tree = ray.direction, self.arrays, self.prepared.tree
         stack, memory = np.empty(stack_size(tree.depth), np.int64), np.empty(HOLDERS_WORDS, np.int64)
         together = together_of(tree.descriptor, arrays, spot, d, stack, memory)
@@ -118,11 +118,11 @@ class Steps:
         return SurfaceHit(t, together, place, surface, n, inside, row, columns, change, left)
 
     def background(self, ray: Ray) -> Vector:
-        """What the pixel receives of a ray that meets nothing."""
+        """The contribution to the pixel of a ray that misses."""
         return times(ray.weight, color_at(self.arrays.colors[1], 0))
 
     def ambient(self, ray: Ray, met: SurfaceHit) -> Vector:
-        """What the pixel receives of the ambient light on a surface."""
+        """The contribution to the pixel of the ambient light on a surface."""
         return times(ray.weight, times(color_at(met.material, AMBIENT), color_at(self.arrays.colors[0], 0)))
 
     def aims(self, ray: Ray, met: SurfaceHit) -> list[Aim]:
@@ -142,7 +142,7 @@ class Steps:
         return aims
 
     def bounce(self, ray: Ray, met: SurfaceHit) -> list[Ray]:
-        """The rays that leave the surface: the reflected one, then the refracted one where light passes."""
+        """The rays spawned at the surface: the reflected one, then the refracted one if light is transmitted."""
         change, m, d = met.change, met.row, ray.direction
         through, passes, k_r, k_t = refract_from(self.arrays, m, d, met.n, change.n1, change.n2)
         mirrored, weight = reflect(d, met.n), times(ray.weight, k_r)
@@ -156,7 +156,7 @@ class Steps:
         return children
 
     def closest(self, origin: Vector, direction: Vector, t_max: float, start: Floats) -> Hits:
-        """The closest hit of one ray as a picture traces it."""
+        """The closest hit of one ray, traced as in a picture."""
         rays, _ = check_rays([origin], [direction], 0.0, [t_max])
         if len(start):
             starts = make_starts(1, self.prepared.mesh)
@@ -165,21 +165,21 @@ class Steps:
         return closest_hits(self.prepared.tree, rays, self.prepared.mesh, 1)
 
     def beyond(self, origin: Vector, direction: Vector) -> Vector:
-        """The point in unit ``direction`` at which the sphere around all faces is left behind for certain."""
+        """The point in unit ``direction`` that is certainly beyond the sphere around all faces."""
         mesh = self.prepared.mesh
         lower, upper = mesh.bounds if len(mesh.faces) else (np.zeros(3), np.ones(3))
         reach = np.linalg.norm(origin - (lower + upper) / 2.0) + np.linalg.norm(upper - lower) / 2.0
         return add(origin, scale(direction, float(reach)))
 
     def _media_at(self, eye: Vector) -> tuple[int, ...]:
-        """The media around the eye, as pictures have them for a camera there."""
+        """The media around the eye, as in pictures by a camera there."""
         if not self.media:
             return ()
         scene = self.prepared.scene
         return tuple(media_around(scene, scene.camera.model_copy(update={"eye": eye})).tolist())
 
     def _start(self, place: Place, n_g: Vector, direction: Vector, came: Vector) -> Floats:
-        """The row of the start of a ray that leaves a surface of normal n_g, where one in direction ``came`` ended."""
+        """The row of the start of a ray that leaves a surface of normal n_g, where one of direction ``came`` ended."""
         if not self.offset.uses_error_bound:
             return _NO_START
         row = np.empty(ROW)
@@ -197,7 +197,7 @@ class Steps:
 
 
 def steps_of(prepared: PreparedScene, offset: OffsetRule = BOUNDED, media: MediaRule = "stack") -> Steps:
-    """The steps of rays in a prepared scene, under rules as of ``render``."""
+    """The steps of rays in a prepared scene, under rules as in ``render``."""
     arrays = arrays_for(prepared, prepared.scene.camera, offset, media)
     return Steps(prepared, arrays, offset, media_limit(prepared.needs, media))
 

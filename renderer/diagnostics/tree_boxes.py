@@ -1,16 +1,17 @@
-"""The boxes of an octree's nodes, level by level, and those that one ray opens: for looking at, not for speed.
+"""The boxes of an octree's nodes, level by level, and those that one ray visits: for inspection, not for speed.
 
-The root is level 0, and an octant, be it a node or a leaf, is one level below its node. Boxes are in scene units, as
-the traversal knows them: rounded outwards to float32.
+The root is level 0. An octant, node or leaf, is one level below its node. Boxes are in scene units, rounded outwards to
+float32 as in the traversal.
 """
 
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from renderer.arguments.counts import count_argument
+from renderer.arguments.types import ArrayLike
 from renderer.jit.decorators import kernel
 from renderer.numerics.simd import splat8, store
 from renderer.octree import BruteForce, Octree
@@ -25,7 +26,7 @@ Boxes = NDArray[np.float64]
 
 
 class Visit(NamedTuple):
-    """A node or leaf that a ray opened: its level, and its box's corners, each (3,) float64."""
+    """A node or leaf that a ray visited: its level, and its box's corners, each (3,) float64."""
 
     level: int
     lower: NDArray[np.float64]
@@ -34,7 +35,7 @@ class Visit(NamedTuple):
 
 
 def levels(octree: Octree | BruteForce) -> int:
-    """The number of levels that have boxes; 0 where there are no nodes, as of ``BruteForce``, or no faces."""
+    """The number of levels with boxes; 0 without nodes, as in ``BruteForce``, or without faces."""
     return octree.tree.depth + 1 if len(_root_box(octree.tree)) else 0
 
 
@@ -61,7 +62,7 @@ def _octants(tree: Tree, nodes: NDArray[np.int64]) -> tuple[Boxes, NDArray[np.in
 
 
 def _root_box(tree: Tree) -> Boxes:
-    """The box around the root's octants as the one row of (1, 6) float64; no row where there are none."""
+    """The box around the root's octants as the only row of (1, 6) float64; no row if there are none."""
     boxes, _ = _octants(tree, np.zeros(min(1, len(tree.nodes)), np.int64))
     if not len(boxes):
         return boxes
@@ -69,12 +70,12 @@ def _root_box(tree: Tree) -> Boxes:
 
 
 def visited(octree: Octree | BruteForce, origin: ArrayLike, direction: ArrayLike, t_max: float = np.inf) -> list[Visit]:
-    """The nodes and leaves that the closest-hit search of one ray opens, in the order in which it does.
+    """The nodes and leaves that the closest-hit search of one ray visits, in order.
 
-    ``origin`` and ``direction`` (3,), ``t_max`` in units of |direction|. The nearest octant goes first, and one whose
-    entry is beyond the best hit so far is not opened. The tests are the kernel's own, so these are the visits of a ray
-    traced alone; a packet of rays may open some together that not all of them need. A ray that misses the root opens
-    nothing. Raises ``ValueError`` naming the argument.
+    ``origin`` and ``direction`` (3,), ``t_max`` in units of |direction|. The nearest octant comes first; one whose
+    entry is beyond the best hit so far is not visited. The tests are the kernel's own, so these are the visits of a ray
+    traced alone; a packet may visit more. A ray that misses the root visits nothing. Raises ``ValueError`` naming the
+    argument.
     """
     rays, _ = check_rays(np.asarray(origin)[None], np.asarray(direction)[None], 0.0, t_max)
     octree.any_hit(rays.origins, rays.directions)  # raises for rays out of bounds
@@ -96,7 +97,7 @@ def visited(octree: Octree | BruteForce, origin: ArrayLike, direction: ArrayLike
 
 
 class _Waiting(NamedTuple):
-    """An octant that waits to be opened: the distance at which the ray enters it, its child, level and box."""
+    """An octant to be visited: the distance at which the ray enters it, its child, level and box."""
 
     distance: float
     child: int
@@ -105,7 +106,7 @@ class _Waiting(NamedTuple):
 
 
 def _above(tree: Tree, box: NDArray[np.float64]) -> Tree:
-    """A node above the root, whose only octant is the root in its ``box``, so that a ray meets it as any other."""
+    """A node above the root, whose only octant is the root in its ``box``, so that a ray enters it as any other."""
     words = np.full(NODE_WORDS, np.inf, np.float32)
     words[:CHILDREN].reshape(3, 2, 8)[:, 1] = -np.inf
     words[:CHILDREN].reshape(3, 2, 8)[:, :, 0] = box.reshape(2, 3).T
@@ -114,7 +115,9 @@ def _above(tree: Tree, box: NDArray[np.float64]) -> Tree:
 
 
 def _met_octants(tree: Tree, node: int, level: int, ray: Ray, t_max: float) -> list[_Waiting]:
-    """The octants of ``node`` that the ray meets up to ``t_max``, nearest last; equal ones in the kernel's order."""
+    """The octants of ``node`` that the ray enters up to ``t_max``, nearest last; at equal distance in the kernel's
+    order.
+    """
     # A copy, which can be written, as the node of ``_above`` can: the kernel is compiled for such arrays alone.
     words, distances = tree.nodes[node * NODE_WORDS : (node + 1) * NODE_WORDS].copy(), np.empty(8, np.float32)
     bits = _meet(words, ray, t_max, distances)
@@ -129,7 +132,9 @@ def _met_octants(tree: Tree, node: int, level: int, ray: Ray, t_max: float) -> l
 
 @kernel
 def _meet(words: NDArray[np.float32], ray: Ray, t_max: float, distances: NDArray[np.float32]) -> int:
-    """``enter_boxes`` of a node for Python: fills ``distances`` (8,) float32 and returns bits of the octants met."""
+    """``enter_boxes`` of a node for Python: fills ``distances`` (8,) float32 and returns the bits of the octants
+    entered.
+    """
     largest = largest_of(ray)
     lower, upper = splat8(round_down(ray.t_min * largest)), splat8(box_limit(t_max, largest))
     t0, bits = enter_boxes(words, 0, make_slabs(ray, largest), lower, upper)
@@ -139,13 +144,13 @@ def _meet(words: NDArray[np.float32], ray: Ray, t_max: float, distances: NDArray
 
 @kernel
 def _limit(ray: Ray, t: float) -> float:
-    """The distance beyond which an octant holds no hit at t or nearer."""
+    """The distance beyond which an octant contains no hit at t or nearer."""
     return box_limit(t, largest_of(ray))
 
 
 @kernel
 def _best_in_leaf(descriptor: NDArray[np.int64], leaf: int, ray: Ray, t: float, face: int) -> tuple[float, int]:
-    """t and face of the best hit so far and those in a leaf."""
+    """t and face of the better of the best hit so far and the hits in a leaf."""
     tree, (first, count) = tree_pointers(descriptor), blocks_of(leaf)
     best = hit_on(np.int32(face), FaceHit(t, 0.0, 0.0, 1.0))
     best = nearest_carefully(tree, first, count, ray, make_shear(ray), best)

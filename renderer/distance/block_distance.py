@@ -1,8 +1,8 @@
 """Bounds of the distances of a point from the four faces of a block, in float64, four at a time.
 
 Any point of a face bounds its distance from above. Projecting the corners on any direction bounds it from below. With
-the nearest point and its direction both bounds are the distance, but for rounding. Where rounding misses that point
-they are wider, and still bounds.
+the nearest point and its direction both bounds equal the distance up to rounding. If rounding misses that point, they
+are wider and still valid.
 """
 
 import numpy as np
@@ -21,8 +21,8 @@ _MORE = 1.0 + 2.0**-48
 
 @inlined
 def bound_distances(tree, base, point, limit):
-    """Of a block's four faces the bits of those that may be within ``limit``, the least distances that they may have,
-    and the limit, lowered to the greatest distance that one of them may have.
+    """The bits of a block's faces that may be within ``limit``, lower bounds of their distances, and the limit, lowered
+    to the least upper bound.
     """
     x0, x1, x2, y0, y1, y2, z0, z1, z2 = load_corners(tree, base, point)
     px, py, pz = splat4(point.x), splat4(point.y), splat4(point.z)
@@ -78,7 +78,7 @@ def _share(part, whole):
 
 @inlined
 def _nearest(bb, bc, cc, b, c):
-    """u and v of the nearest points, from the products of the sides with each other, and with the way to the point."""
+    """u and v of the nearest points, from products of the sides with each other and with the vector to the point."""
     zero, one, two = splat4(0.0), splat4(1.0), splat4(2.0)
     # On the three edges, and how their squared distances differ from that of the first corner.
     sides, along = bb + cc - two * bc, c - b + bb - bc

@@ -1,20 +1,22 @@
-"""Closest points on a mesh: checks at the boundary, chunks on threads, and the result."""
+"""The query ``closest_point``: checks, chunks of points on threads, and the result."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from renderer.arguments.arrays import real_argument
 from renderer.arguments.points import check_points, farthest_of
+from renderer.arguments.types import ArrayLike
 from renderer.distance.nearest import LISTED, UNDECIDED_FACE, find_nearest
 from renderer.distance.rational import nearest_exactly
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.ordering.cells import search_in_order
 from renderer.results.closest_points import ClosestPoints
+from renderer.trace.batch import joint_shape
 from renderer.trace.closest import rays_against_blocks
 from renderer.trace.layout import Tree
 from renderer.trace.rays import HIT_ROWS
@@ -28,7 +30,14 @@ def closest_point(tree: Tree, mesh: Mesh, points: ArrayLike, max_distance: Array
     """The nearest point of the mesh to each point, see ``Octree.closest_point``."""
     expect(len(mesh.faces) > 0, "mesh", "faces", "none")
     given, shape = check_points("points", points, farthest_of(tree.scale))
-    limits = _limits(max_distance, shape)
+    limits = _limits(max_distance)
+    if limits.shape not in ((), shape):
+        given = given.reshape(*shape, 3)
+        shape = joint_shape("max_distance", limits.shape, shape, "that of the points")
+        # Copies, as Numba would compile the search again for arrays that are not writable.
+        given = np.array(np.broadcast_to(given, (*shape, 3))).reshape(-1, 3)
+        limits = np.array(np.broadcast_to(limits, shape))
+    limits = limits.reshape(-1)
     out = np.empty((HIT_ROWS, len(given)))
 
     def find(rows: NDArray[np.int64], some: NDArray[np.float64]) -> Iterator[None]:
@@ -52,13 +61,11 @@ def closest_point(tree: Tree, mesh: Mesh, points: ArrayLike, max_distance: Array
     return ClosestPoints(distance, faces.reshape(shape), u, v, mesh)
 
 
-def _limits(max_distance: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """One largest distance for all points, or one for each."""
-    given = real_argument("max_distance", max_distance)
-    expect(given.ndim == 0 or given.shape == shape, "max_distance", f"a number or shape {shape}", f"{given.shape}")
-    limits = np.array(given, np.float64).reshape(-1)
-    good = limits >= 0.0
+def _limits(max_distance: ArrayLike) -> NDArray[np.float64]:
+    """Largest distances as an array of any shape, from 0."""
+    limits = np.array(real_argument("max_distance", max_distance), np.float64)
+    good = limits.reshape(-1) >= 0.0
     if not good.all():
         row = int((~good).argmax())
-        expect(False, "max_distance", "numbers from 0", f"{limits[row]} in row {row}")
+        expect(False, "max_distance", "numbers from 0", f"{limits.reshape(-1)[row]} in row {row}")
     return limits

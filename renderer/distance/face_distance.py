@@ -1,7 +1,7 @@
-"""The distance of a point from a face, with twice the digits: rounded once, and 0 only on the face itself.
+"""The distance of a point from a face, with twice the digits: rounded once, and 0 only on the face.
 
-The nearest point is in the face's interior where the point lies on the inner side of all edges, as seen along the
-normal, and else on an edge. Two faces that share an edge compute the same bits for it.
+The nearest point is inside the face if the point, seen along the normal, is on the inner side of all edges; otherwise
+it is on an edge. Two faces that share an edge compute the same bits for it.
 """
 
 from typing import Any, NamedTuple
@@ -23,9 +23,9 @@ from renderer.numerics.predicates import UNDECIDED, lies_within, volume_sign
 from renderer.numerics.simd import maximum, store
 
 # Shares of the terms of a sum of products of pairs, which errs by 2^-98 of them. Below CANCELLED it loses so many
-# digits that it is computed as an expansion. Below LOST its sign is in doubt: a point so near an edge, as seen along
-# the normal, is taken as on it, which moves its distance from the face by LOST of its reach at most. And so near the
-# middle of two float64 a distance is taken as there.
+# digits that it is computed as an expansion. Below LOST its sign is uncertain: a point so near an edge, seen along the
+# normal, counts as on it, which changes its distance from the face by at most LOST of its reach. A distance so near the
+# middle of two float64 counts as the middle.
 _CANCELLED, _LOST = 2.0**-40, 2.0**-90
 _TINIEST = 2.0**-1000
 # Where ``parts`` has a number behind the expansion: not 0 once products of a distance have vanished or overflowed.
@@ -51,8 +51,9 @@ class FaceView(NamedTuple):
 def distance_to_face(a, b, c, p, parts):
     """The distance of the point p from a face, and u and v of the face's nearest point.
 
-    The distance errs by less than an ulp, or by 2^-90 of that of the farthest corner if that is more, and is 0 on the
-    face only; else ``parts``, memory for an expansion, has a number at UNDECIDED_FLAG that is not 0.
+    The error is less than an ulp, or than 2^-90 of the distance of the farthest corner if that is more, and the
+    distance is 0 only on the face. If float64 cannot decide, ``parts``, memory for an expansion, has a number other
+    than 0 at UNDECIDED_FLAG.
     """
     view = _view_face(a, b, c, p)
     normal = _normal(view, a, b, c, parts)
@@ -82,7 +83,7 @@ def distance_to_face(a, b, c, p, parts):
         d, t = _distance_to_edge(c, a, p, view.pc, view.pa, view.ca, view, parts)
         if d < distance:
             distance, u, v = d, 0.0, 1.0 - t
-    # So near that rounding cannot tell, decide exactly whether the point lies on the face.
+    # Where rounding could decide, find exactly whether the point lies on the face.
     if distance < 2.0 * _LOST:
         distance = _on_or_beside(a, b, c, p, distance, parts)
     return distance / view.to_reach, u, v
@@ -90,7 +91,7 @@ def distance_to_face(a, b, c, p, parts):
 
 @kernel
 def _on_or_beside(a, b, c, p, distance, parts):
-    """``distance``, or 0 where the point lies on the face."""
+    """``distance``, or 0 if the point lies on the face."""
     side = volume_sign(a, b, c, p, parts)
     on = lies_within(a, b, c, p, parts) if side == 0 else np.int64(side == UNDECIDED) * UNDECIDED
     if on == 1:
@@ -128,7 +129,7 @@ def _scaled(pair, x, y):
 
 @kernel
 def _normal(view, a, b, c, parts):
-    """The vector product of a face's sides."""
+    """The cross product of a face's sides."""
     normal = cross_pairs(view.ca, view.ab)
     if _largest(normal) < _CANCELLED:
         return _expanded(b, c, a, view.to_side, view.to_side, normal, parts)
@@ -137,7 +138,7 @@ def _normal(view, a, b, c, parts):
 
 @kernel
 def _expanded(a, b, p, first, second, otherwise, parts):
-    """(a - p) x (b - p) times two factors, by expansions, or ``otherwise`` where they are out of range."""
+    """(a - p) x (b - p) times two factors, by expansions, or ``otherwise`` if they are out of range."""
     x = expand_area((a[1], a[2]), (b[1], b[2]), (p[1], p[2]), parts)
     x_pair = pair_of(parts, x)
     y = expand_area((a[2], a[0]), (b[2], b[0]), (p[2], p[0]), parts)
@@ -166,7 +167,7 @@ def _height(view, normal, a, b, c, p, parts):
 
 @kernel
 def _distance_to_edge(a, b, p, pa, pb, ab, view, parts):
-    """The distance of the point from the edge from a to b, in units of its reach, and the share of the way from a."""
+    """The distance of the point from the edge from a to b, in units of its reach, and the share of the edge from a."""
     if _precedes(b, a):
         d, t = _distance_to_ordered(b, a, p, pb, pa, negative(ab), view, parts)
         return d, 1.0 - t
@@ -190,9 +191,9 @@ def _distance_to_ordered(a, b, p, pa, pb, ab, view, parts):
 
 @kernel
 def _rounded(pair):
-    """A pair >= 0 as one float64: halfway between two the even one, also where the last digits of the pair are lost.
+    """A pair >= 0 as one float64: to even if halfway, also where the last digits of the pair are lost.
 
-    So equal distances, which faces in one plane have, stay equal.
+    So equal distances, as of faces in one plane, stay equal.
     """
     head, tail = pair[0], pair[1]
     bits = np.int64(np.float64(head).view(np.int64))

@@ -1,7 +1,7 @@
-"""The face that is nearest to a point: a search through the tree, the nearest boxes first.
+"""The face nearest to a point: a traversal of the tree, nearest boxes first.
 
 The search keeps a bound of the distance and lists the faces that may be within it. ``distance_to_face`` measures only
-those. So the result is the least of those distances over all faces, whatever the tree and the order.
+those. So the result is the least of these distances over all faces, for any tree and order.
 """
 
 from typing import Any, NamedTuple
@@ -49,7 +49,7 @@ _VANISHED = 2.0**-1060
 
 
 class Nearest(NamedTuple):
-    """The nearest face so far: its distance, its number (NO_FACE for none), and where on it the nearest point lies."""
+    """The nearest face so far: its distance, its number (NO_FACE for none), and u and v of its nearest point."""
 
     distance: float
     face: Any
@@ -58,12 +58,12 @@ class Nearest(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Memory of a scratch, as pointers.
+    """Scratch as pointers.
 
-    children, near  the nodes and leaves that wait, and the squares of their boxes' distances
-    places, least   the listed faces' places in the blocks, and the least distances that they may have
+    children, near  the waiting nodes and leaves, and the squared distances of their boxes
+    places, least   the listed faces' places in the blocks, and lower bounds of their distances
     squares         eight squares
-    work            the blocks tested so far, and, as more of them, the faces measured
+    work            the blocks tested so far; each face measured counts as several
     parts           memory for an expansion
     """
 
@@ -84,7 +84,7 @@ class _Query(NamedTuple):
 
 
 class _Found(NamedTuple):
-    """The nearest face so far, the number of faces that are listed, and a bound of the distance."""
+    """The nearest face so far, the number of listed faces, and a bound of the distance."""
 
     best: Nearest
     listed: int
@@ -99,7 +99,7 @@ def find_nearest(descriptor, points, rows, limits, out, integers, doubles, begin
     limits     (m,) or (1,), the largest distance that counts
     integers   memory for ``walk.stack_size`` and LISTED int64; ``doubles``, for as many float64 and nine more
 
-    Returns the row before which it ended: early after WORK, so that Ctrl-C need not wait for long.
+    Returns the row before which it ended, early after WORK, so that Ctrl-C need not wait.
     """
     tree, parts, count = tree_pointers(descriptor), local_doubles(), len(points)
     found, size = hit_pointers(out, out.shape[1]), len(integers) - LISTED
@@ -138,7 +138,7 @@ def find_nearest(descriptor, points, rows, limits, out, integers, doubles, begin
 
 @kernel
 def measure_faces(triangles, point, out):
-    """Write distance, u and v of each face (k, 3 corners, 3) seen from a point (3,), and 1 where they are known, to
+    """Write distance, u and v of each face (k, 3 corners, 3) seen from a point (3,), and 1 if they are known, to
     ``out`` (k, 4).
     """
     parts, p = local_doubles(), three(pointer(point), 0)
@@ -151,7 +151,7 @@ def measure_faces(triangles, point, out):
 
 @inlined
 def _is_scaled(point, p, scale):
-    """Whether the tree's units hold the coordinates at ``p`` exactly."""
+    """Whether the tree's units represent the coordinates at ``p`` exactly."""
     return point.x / scale == load(p, 0) and point.y / scale == load(p, 1) and point.z / scale == load(p, 2)
 
 
@@ -186,15 +186,15 @@ def _visit(tree, query, first, count, found):
 
 @inlined
 def _squared(limit):
-    """At least as much as the square of a box's distance that is within the limit."""
+    """An upper bound of the square of a box's distance that is within the limit."""
     return limit * limit * _MORE + _VANISHED
 
 
 @inlined
 def _push_nearest_last(tree, node, bits, scratch, top):
-    """Let the octants ``bits`` of a node wait, the nearest on top.
+    """Push the octants ``bits`` of a node, the nearest on top.
 
-    The others are in no order: most are out of reach once the nearest is searched, and sorting takes longer.
+    The others are unsorted: most are out of reach once the nearest is searched, and sorting takes longer.
     """
     if bits == 0:
         return top
@@ -218,7 +218,7 @@ def _push_nearest_last(tree, node, bits, scratch, top):
 
 @inlined
 def _bound_boxes(nodes, base, point, limit, squares):
-    """Write lower bounds of the squared distances of eight boxes; returns the bits of those within the limit."""
+    """Write lower bounds of the squared distances of eight boxes. Returns the bits of those within the limit."""
     low, high = _bound_four(nodes, base, point), _bound_four(nodes, base + 4, point)
     store(squares, 0, low)
     store(squares, 4, high)
@@ -233,7 +233,7 @@ def _bound_four(nodes, base, point):
 
 @inlined
 def _gap(nodes, row, x):
-    """The way of a coordinate to each of four intervals, 0 within; inf for those of empty octants."""
+    """The distance of a coordinate from each of four intervals, 0 inside; inf for empty octants."""
     zero, below, above = splat4(0.0), load4(nodes, row) - splat4(x), splat4(x) - load4(nodes, row + 8)
     gap = select(below > above, below, above)
     return select(gap > zero, gap, zero)
@@ -241,7 +241,7 @@ def _gap(nodes, row, x):
 
 @kernel
 def _list_faces(tree, query, first, count, found):
-    """List the faces of some blocks that may be within the limit, and lower that to what they bound."""
+    """List the faces of some blocks that may be within the limit, and lower the limit to their least upper bound."""
     scratch, best, listed, limit = query.scratch, found.best, found.listed, found.limit
     store(scratch.work, 0, load(scratch.work, 0) + count)
     for block in range(first, first + count):
@@ -260,9 +260,7 @@ def _list_faces(tree, query, first, count, found):
 
 @kernel
 def _settle(tree, query, found):
-    """The better of the best face and the listed ones that are still within the limit: least distance, then lowest
-    face.
-    """
+    """The better of the best face and the listed ones still within the limit: least distance, then lowest face."""
     best, scratch, p = found.best, query.scratch, (query.point.x, query.point.y, query.point.z)
     for k in range(found.listed):
         if load(scratch.least, k) > found.limit:

@@ -1,4 +1,4 @@
-"""Points that lie on the surface, within the roundings that they went through, and where on it they lie."""
+"""Finds the points that lie on the surface, up to roundings, and their places there."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ Floats = NDArray[np.float64]
 
 
 class SurfacePoints(NamedTuple):
-    """Where points lie on the surface.
+    """The places of points on the surface.
 
-    faces    (n,) int64, the face that each lies on, -1 for a point that lies on none
-    codes    (n,) int64, BARYCENTRIC of ``starts.record`` or 0: how the anchors are given
-    anchors  (n, 3) float64: the place, if it is one of float64, else its barycentrics u and v, and 0
+    faces    (n,) int64, the face of each point, -1 for a point on none
+    codes    (n,) int64, BARYCENTRIC of ``starts.record`` or 0: the kind of anchor
+    anchors  (n, 3) float64: the place if float64 represents it, else its barycentrics u and v, and 0
     """
 
     faces: NDArray[np.int64]
@@ -33,11 +33,11 @@ class SurfacePoints(NamedTuple):
 
 
 def on_surface(tree: Tree, mesh: Mesh, points: Floats, faces: NDArray[np.int64], threads: int) -> SurfacePoints:
-    """The places of points (n, 3) on the surface: on ``faces`` (n,), or where these are -1 on the nearest face, if it
-    is as near as DOUBLE of the point's largest coordinate; or, for a point of float32 numbers, if no coordinate is
-    farther off than SINGLE of itself.
+    """The places of points (n, 3) on the surface.
 
-    A point as near to an edge or corner is taken for one on it.
+    A point lies on its face in ``faces`` (n,). If that is -1, it lies on the nearest face if its distance is at most
+    DOUBLE of its largest coordinate; or, for a point of float32 numbers, if each coordinate is off by at most SINGLE of
+    itself. A point as near to an edge or corner is taken to be on it.
     """
     faces, rough, unknown = faces.copy(), _are_single(points), np.flatnonzero(faces < 0)
     if len(unknown) and len(mesh.faces):
@@ -51,22 +51,22 @@ def on_surface(tree: Tree, mesh: Mesh, points: Floats, faces: NDArray[np.int64],
 
 
 def _are_single(points: Floats) -> NDArray[np.bool_]:
-    """Whether all coordinates of points are numbers of float32."""
+    """Whether all coordinates of each point are float32 numbers."""
     with np.errstate(over="ignore", invalid="ignore"):
         return (points == points.astype(np.float32)).all(axis=1)
 
 
 def _near_faces(tree: Tree, mesh: Mesh, points: Floats, threads: int) -> NDArray[np.int64]:
-    """The faces that points lie on but for SINGLE of each coordinate, -1 for none."""
+    """The faces on which points lie up to SINGLE of each coordinate, -1 for none."""
     room = SINGLE * np.abs(points)
     near = closest_point(tree, mesh, points, 2.0 * room.max(axis=1, initial=0.0), threads)
-    # How far the way to the nearest point is along itself, against what the roundings may be along it.
+    # The length of the vector to the nearest point, along itself, against the room of the roundings along it.
     way = np.abs(points - near.points)
     return np.where((way * way).sum(axis=1) <= (way * room).sum(axis=1), near.face, -1)
 
 
 def places_of(mesh: Mesh, points: Floats, places: SurfacePoints) -> Floats:
-    """Points (n, 3), those on the surface moved to their places there."""
+    """Points (n, 3), with those on the surface moved to their places there."""
     found, on = points.copy(), places.faces >= 0
     found[on] = places.anchors[on]
     rounded = np.flatnonzero(on & (places.codes == BARYCENTRIC))
@@ -76,9 +76,9 @@ def places_of(mesh: Mesh, points: Floats, places: SurfacePoints) -> Floats:
 
 
 def check_on(mesh: Mesh, argument: str, points: Floats, faces: NDArray[np.int64]) -> None:
-    """Raise ``ValueError`` naming the row of a point that is farther from its face than points of float32 are.
+    """Raise ``ValueError`` naming the row of a point farther from its face than float32 rounding explains.
 
-    faces  (n,), -1 for a point of which no face is named
+    faces  (n,), -1 for a point without a named face
     """
     named = np.flatnonzero(faces >= 0)
     if not len(named):

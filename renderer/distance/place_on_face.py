@@ -1,4 +1,4 @@
-"""Where on a face a point lies, as barycentrics that are exact at edges and corners; and how far it is from there."""
+"""The place of a point on a face, as barycentrics that are exact at edges and corners, and its distance from there."""
 
 import numpy as np
 
@@ -28,12 +28,12 @@ _EXACT = 2.0**-80
 
 @kernel
 def anchor_all(vertices, faces, points, chosen, rough, codes, anchors):
-    """Write codes and anchors of points on faces ``chosen`` (n,); of face -1 nothing.
+    """Write codes and anchors of points on faces ``chosen`` (n,); nothing for face -1.
 
-    Nearer to an edge than DOUBLE, a point is on it; one that is farther from its face, and ``rough`` (n,), if it is
-    nearer than SINGLE, both of its largest coordinate. At a corner the anchor is the corner. A point that lies inside a
-    face, within DOUBLE, or exactly on an edge, is its own anchor: it may lie exactly on other faces, as at the foot of
-    a wall. Else the anchor has barycentrics.
+    A point is on an edge if it is nearer than DOUBLE of its largest coordinate; if it is farther from its face and
+    ``rough`` (n,), SINGLE takes the place of DOUBLE. At a corner the anchor is the corner. A point inside a face,
+    within DOUBLE, or exactly on an edge is its own anchor, as it may lie exactly on other faces, such as at the foot of
+    a wall. Otherwise the anchor has barycentrics.
     """
     for i in range(len(points)):
         if chosen[i] >= 0:
@@ -56,8 +56,8 @@ def anchor_all(vertices, faces, points, chosen, rough, codes, anchors):
 
 @inlined
 def _measured(p0, p1, p2, u, v, o, enough):
-    """How far a point is from a face, along the axis where it is farthest: with twice the digits, if it is not as near
-    as ``enough`` to the place of barycentrics u and v.
+    """The distance of a point from a face along the axis where it is largest; with twice the digits, unless it is
+    within ``enough`` of the place of barycentrics u and v.
     """
     distance = largest_component(sub(o, barycentric(p0, p1, p2, u, v)))
     return distance if distance <= enough else far_from(anchor_of(Start((p0, p1, p2), o, 0, 0)), o)
@@ -65,7 +65,7 @@ def _measured(p0, p1, p2, u, v, o, enough):
 
 @kernel
 def _is_exact(p0, p1, p2, u, v, o):
-    """Whether a point with barycentrics u and v is inside a face, or exactly on the edge where these are."""
+    """Whether a point with barycentrics u and v is inside a face, or exactly on the edge if u and v are."""
     w = 1.0 - u - v
     if w == 0.0:
         return u > 0.0 and v > 0.0 and _is_between(p1, p2, o)
@@ -84,8 +84,8 @@ def _is_between(p, q, o):
 
 @kernel
 def measure_all(vertices, faces, points, chosen, enough, distances):
-    """Write how far points are from faces, along the axis where they are farthest, but for rounding where that is no
-    more than ``enough`` (n,).
+    """Write the distances of points from faces along the axis where they are largest; approximate up to ``enough``
+    (n,).
     """
     for i in range(len(points)):
         p0, p1, p2 = corners_of(pointer(vertices), pointer(faces), chosen[i], 1.0)
@@ -101,7 +101,7 @@ def _over(a, size):
 
 @kernel
 def _weights_of(p0, p1, p2, o, room):
-    """u and v of the point of a face that is nearest to o; nearer to an edge than ``room``, one on it."""
+    """u and v of the point of a face nearest to o; a point within ``room`` of an edge is on it."""
     s0, s1, s2 = sub(p2, p1), sub(p0, p2), sub(p1, p0)
     size = largest_of_three(s0, s1, s2)
     if size == 0.0:
@@ -123,14 +123,14 @@ def _weights_of(p0, p1, p2, o, room):
 
 @inlined
 def _beyond(part, room):
-    """A number where it is more than some room, else 0; also of NaN."""
+    """A number if it exceeds some room, else 0, also for NaN."""
     return part if part > room else 0.0
 
 
 @inlined
 def _exact_shares(a, b, c):
-    """u and v of three weights >= 0, whose sum is not 0: at corners 0 or 1, on the side opposite to the first corner 1
-    in all.
+    """u and v of three weights >= 0, not all 0: exactly 0 or 1 at corners, 1 in total on the side opposite to the first
+    corner.
     """
     whole = a + b + c
     if b == whole or c == whole:
@@ -144,9 +144,9 @@ def _exact_shares(a, b, c):
 
 @kernel
 def _along_longest(s0, s1, s2, w0, w1, w2, room):
-    """Weights of the nearest point of the longest side; within ``room`` of a corner those of the corner.
+    """Weights of the nearest point of the longest side; within ``room`` of a corner, those of the corner.
 
-    The side s0 is opposite to the first corner, from which w0 leads to the point; and so on.
+    Side s0 is opposite to the first corner, from which w0 leads to the point; likewise s1, s2.
     """
     l0, l1, l2 = length(s0), length(s1), length(s2)
     d0, d1, d2 = length(w0), length(w1), length(w2)
@@ -165,6 +165,6 @@ def _along_longest(s0, s1, s2, w0, w1, w2, room):
 
 @inlined
 def _share_along(side, way, size):
-    """How far along a side of some length its point lies that is nearest to the end of a way from its first corner."""
+    """The share along a side, of some length, of its point nearest to the end of a vector from its first corner."""
     along = dot(side, way) / size
     return minimum(along / size, 1.0) if along > 0.0 else 0.0

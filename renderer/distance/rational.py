@@ -1,4 +1,4 @@
-"""Nearest points in rational arithmetic, for the few points whose products float64 cannot hold."""
+"""Nearest points in rational arithmetic, for the few points whose products float64 cannot represent."""
 
 import math
 from fractions import Fraction
@@ -20,8 +20,9 @@ def nearest_exactly(
 ) -> tuple[float, float, float, int]:
     """The distance of a point (3,) from triangles (F, 3 corners, 3), u, v and the face.
 
-    Faces that float64 decides have the distances that a search gives them, with the tree's ``scale``, so that answers
-    do not depend on what a search meets; the others have theirs rounded once. Of equal distances the lowest face wins.
+    Faces that float64 can decide get the distances of a search, with the tree's ``scale``, so that answers do not
+    depend on the order of a search; the distances of the others are rounded once. At equal distances the lowest face
+    wins.
     """
     faces, found = _candidates(point, triangles), list[tuple[float, int, float, float]]()
     measured = np.zeros((len(faces), 4))
@@ -38,7 +39,7 @@ def nearest_exactly(
 
 
 def _candidates(point: NDArray[np.float64], triangles: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Faces that may be the nearest: by their boxes from below and by their corners from above, without any product."""
+    """Faces that may be the nearest, by lower bounds from boxes and upper bounds from corners, without products."""
     away = triangles - point
     gap = np.maximum(away.min(axis=1), -away.max(axis=1)).max(axis=1)
     corner = np.abs(away).sum(axis=2).min()
@@ -67,7 +68,7 @@ def _square(a: Vector, ab: Vector, ac: Vector, u: Fraction, v: Fraction) -> Frac
 
 
 def _share(part: Fraction, whole: Fraction) -> Fraction:
-    """part / whole from 0 to 1; 0 of a side that is a point."""
+    """part / whole from 0 to 1; 0 for a side of length 0."""
     return min(max(part / whole, Fraction(0)), Fraction(1)) if whole else Fraction(0)
 
 

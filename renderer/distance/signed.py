@@ -1,8 +1,9 @@
-"""Signed distances: how far from ``closest_point``, on which side from ``contains``."""
+"""Signed distances: ``closest_point`` with the sign of ``contains``."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from renderer.arguments.types import ArrayLike
 from renderer.distance.closest import closest_point
 from renderer.inside.contains import contains
 from renderer.mesh.mesh import Mesh

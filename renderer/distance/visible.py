@@ -1,14 +1,16 @@
-"""Whether points see each other: whether segments without their ends hit anything."""
+"""Visibility between points: whether segments, without their ends, hit anything."""
 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from renderer.arguments.arrays import real_argument
 from renderer.arguments.points import check_points, farthest_of
+from renderer.arguments.types import ArrayLike
 from renderer.distance.on_surface import SurfacePoints, are_on, check_on, on_surface, places_of
 from renderer.mesh.mesh import Mesh
-from renderer.trace.batch import Leaving, RayBatch, broadcast_shape, check_faces, offset_origins
+from renderer.trace.batch import Leaving, RayBatch, broadcast_shape, check_faces, joint_shape, offset_origins
 from renderer.trace.closest import any_hits, closest_hits
 from renderer.trace.layout import Tree
 
@@ -21,7 +23,7 @@ _LEAST = float(np.finfo(np.float64).smallest_subnormal)
 
 
 class _Ends(NamedTuple):
-    """One end of n segments: its points (n, 3), and where on the surface they lie."""
+    """One end of n segments: its points (n, 3), and their places on the surface."""
 
     points: Floats
     places: SurfacePoints
@@ -34,11 +36,14 @@ def visible(
     faces: tuple[ArrayLike | None, ArrayLike | None],
     threads: int,
 ) -> NDArray[np.bool_]:
-    """Whether segments meet nothing between their ends, which lie on ``faces``; see ``Octree.visible``."""
+    """Whether segments hit nothing between their ends, which lie on ``faces``; see ``Octree.visible``."""
     farthest, most = farthest_of(tree.scale), len(mesh.faces)
     (a, shape_a), (b, shape_b) = check_points("points", ends[0], farthest), check_points("targets", ends[1], farthest)
     a, b = a.reshape(*shape_a, 3), b.reshape(*shape_b, 3)
     shape = broadcast_shape("targets", b, "points", a)
+    for argument, given in zip(("leaving", "reaching"), faces, strict=True):
+        if given is not None:
+            shape = joint_shape(argument, real_argument(argument, given).shape, shape, "that of points and targets")
     a, b = np.broadcast_to(a, (*shape, 3)).reshape(-1, 3), np.broadcast_to(b, (*shape, 3)).reshape(-1, 3)
     on_a = check_faces("leaving", -1 if faces[0] is None else faces[0], shape, most)
     on_b = check_faces("reaching", -1 if faces[1] is None else faces[1], shape, most)
@@ -54,15 +59,15 @@ def visible(
 
 
 def _end(tree: Tree, mesh: Mesh, points: Floats, faces: NDArray[np.int64], threads: int) -> _Ends:
-    """One end of segments, on the surface exactly where it lies on it."""
+    """One end of segments, moved exactly onto the surface if it lies on it."""
     places = on_surface(tree, mesh, points, faces, threads)
     return _Ends(places_of(mesh, points, places), places)
 
 
 def _are_open(tree: Tree, mesh: Mesh, start: _Ends, stop: _Ends, threads: int) -> NDArray[np.bool_]:
-    """Whether nothing is between the ends of segments."""
+    """Whether nothing lies between the ends of segments."""
     seen = ~any_hits(tree, _between(tree, mesh, start, stop, threads), threads)
-    # Where a face that holds the end is the first that is met, nothing is before it.
+    # If the first face hit is one that contains the end, nothing lies before the end.
     doubtful = np.flatnonzero(~seen & (stop.places.faces >= 0))
     if len(doubtful):
         start, stop = _picked(start, doubtful), _picked(stop, doubtful)
@@ -79,7 +84,7 @@ def _picked(end: _Ends, rows: NDArray[np.int64]) -> _Ends:
 
 
 def _between(tree: Tree, mesh: Mesh, start: _Ends, stop: _Ends, threads: int) -> RayBatch:
-    """Rays from the one end to the other, both left out."""
+    """Rays from one end to the other, both excluded."""
     # rule: room-at-ends
     room = _BESIDE * np.maximum(np.abs(start.points), np.abs(stop.points)).max(axis=1, initial=0.0)
     directions, reach = _way(start.points, stop.points)

@@ -1,1 +1,1 @@
-"""Which points lie inside a mesh: exact crossings for closed ones, winding numbers for all."""
+"""Points inside a mesh: exact crossings for closed meshes, winding numbers for all."""

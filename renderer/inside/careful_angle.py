@@ -1,10 +1,10 @@
-"""The solid angle of a face from a point at any distance from its edges and plane: without differences that cancel.
+"""The solid angle of a face from a point however near to its edges and plane, without cancellation.
 
 With a corner a, A the angle there of the face as seen on a sphere, and (ab) and (ac) the angles at the point between
 the corners, half the solid angle is the angle of the complex number e^(iA) + cot((ab)/2) cot((ac)/2). Its size is
-cos((bc)/2) / (sin((ab)/2) sin((ac)/2)), at least cos((bc)/2): of the corner a where (bc) is the smallest of the three,
-which is at most a third of a turn, at least 1/2. So whatever is known to 2^-50 absolutely gives the angle to 2^-47:
-float64 does, where e^(iA) has the directions of a x b and a x c to 2^-50, however short these are.
+cos((bc)/2) / (sin((ab)/2) sin((ac)/2)), at least cos((bc)/2). Choose the corner a for which (bc) is the smallest of the
+three: at most a third of a turn, so the size is at least 1/2. An absolute error of 2^-50 then gives the angle to 2^-47.
+Float64 is enough if e^(iA) is computed from the directions of a x b and a x c to 2^-50, however short these are.
 Source: Todhunter, Spherical Trigonometry, 1886, the spherical excess from two sides and the angle between them.
 """
 
@@ -34,7 +34,7 @@ _LEAST = 2.0**-900
 
 @kernel
 def careful_angle(a, b, c, p, parts):
-    """Half the solid angle of a face from p, within 2^-47; NaN where products leave float64's range.
+    """Half the solid angle of a face from p, within 2^-47; NaN if products leave float64's range.
 
     It is 0 for a point on the face: the mean of its two sides.
     """
@@ -58,7 +58,7 @@ def careful_angle(a, b, c, p, parts):
 
 @kernel
 def _angle_at(a, b, c, p, x, y, z, parts):
-    """The angle by its corner between the two sides that are longest from the point; x, y, z: directions to corners."""
+    """The angle at its corner between the two sides longest from the point; x, y, z: directions to corners."""
     m, n = _normal(a, b, p, parts), _normal(a, c, p, parts)
     across = cross(m, n)
     sine, side = length(across), 1 if dot(across, x) > 0.0 else -1
@@ -71,13 +71,13 @@ def _angle_at(a, b, c, p, x, y, z, parts):
 
 @kernel
 def _cotangent(x, y):
-    """The cotangent of half the angle between two directions; 2 at most, as that angle is 54 degrees at least."""
+    """The cotangent of half the angle between two directions; at most 2, as that angle is at least 54 degrees."""
     return length(cross(x, y)) / (1.0 - dot(x, y))
 
 
 @kernel
 def _normal(a, b, p, parts):
-    """The direction of (a - p) x (b - p); NaN where that is 0 and where products leave float64's range."""
+    """The direction of (a - p) x (b - p); NaN if that is 0 or products leave float64's range."""
     m = heads(cross_pairs(_near_one(a, p), _near_one(b, p)))
     if _largest(m) < _LEAST_PRODUCT:
         # Digits that cancel: their exact sum.
@@ -93,7 +93,7 @@ def _normal(a, b, p, parts):
 
 @kernel
 def _expand_normal(a, b, p, s, parts):
-    """(a - p) x (b - p) times a number above 0 of points whose axes were stretched by s; NaN out of range."""
+    """(a - p) x (b - p) times a positive number, for points whose axes were stretched by s; NaN out of range."""
     most = maximum(maximum(s[0], s[1]), s[2])
     x = _expand((a[1], a[2]), (b[1], b[2]), (p[1], p[2]), parts) * (s[0] / most)
     y = _expand((a[2], a[0]), (b[2], b[0]), (p[2], p[0]), parts) * (s[1] / most)
@@ -109,18 +109,18 @@ def _expand(a, b, p, parts):
 
 @inlined
 def _largest(v):
-    """The largest component without its sign; NaN where one is NaN or infinite."""
+    """The largest component without its sign; NaN if one is NaN or infinite."""
     return maximum(maximum(abs(v[0]), abs(v[1])), abs(v[2])) + 0.0 * (v[0] + v[1] + v[2])
 
 
 @kernel
 def _direction(a, p):
-    """The direction from p to a, size one."""
+    """The unit vector from p to a."""
     x = heads(_near_one(a, p))
     return scale(x, 1.0 / length(x))
 
 
 @inlined
 def _near_one(a, p):
-    """a - p times a power of two that brings its largest component near 1, which changes no angle."""
+    """a - p times a power of two, with a largest component near 1; this changes no angle."""
     return scaled_difference(a, p, 1.0 / power_below(maximum(largest_component(sub(a, p)), _TINIEST)))

@@ -1,14 +1,15 @@
-"""Points inside a mesh: checks at the boundary, chunks on threads."""
+"""The query ``contains``: checks, and chunks of points on threads."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from renderer.arguments.arrays import flag_argument
 from renderer.arguments.points import check_points
+from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.inside.crossings import ON_FACE, UNDECIDED_COUNT, count_crossings
 from renderer.inside.rational import crossings_of

@@ -1,10 +1,10 @@
-"""Crossings of a ray from a point along an axis, counted exactly: they decide what lies inside.
+"""Exact crossings of a half-line from a point along an axis: they decide whether the point is inside.
 
-Each crossing counts 1 or -1, so their sum, the winding number, is odd where their number is.
+Each crossing counts 1 or -1. The sum is the winding number; it is odd if the number of crossings is odd.
 
 Seen along the axis, the projected faces are a planar map. A point on an edge or corner of the map is moved by (e, e^2),
 e infinitely small, across the axis, so that it lies in exactly one face of each sheet. All signs are exact, by a bound
-of their rounding errors or by expansions, so the counts are those of real arithmetic, along whichever axis.
+of their rounding errors or by expansions, so the counts are those of real arithmetic along any axis.
 """
 
 from typing import Any, NamedTuple
@@ -48,11 +48,11 @@ _AREA_LOSS, _VOLUME_LOSS = 2.0**-1070, 2.0**-930
 
 
 class AxisRay(NamedTuple):
-    """A point and the half-line from it along an axis: its axes turned so that z is that axis.
+    """A point and the half-line from it along an axis; axes are turned so that it is z.
 
     row_x, row_y, row_z  where a block has the coordinates of each axis
     x, y, z              the point
-    up                   whether the half-line goes to larger z
+    up                   whether the half-line leads to larger z
     """
 
     row_x: Any
@@ -65,15 +65,15 @@ class AxisRay(NamedTuple):
 
 
 class _Query(NamedTuple):
-    """A ray, and memory for an expansion, behind which the blocks tested are counted."""
+    """A ray, and memory for an expansion; behind it the blocks tested are counted."""
 
     ray: AxisRay
     parts: Any
 
 
 class _Crossings(NamedTuple):
-    """What a ray has crossed: the winding number so far; and 1 where its point lies on a face, UNDECIDED or more where
-    float64 cannot decide.
+    """The crossings so far: the winding number, and 1 if the point lies on a face, UNDECIDED or more if float64 cannot
+    decide.
     """
 
     winding: int
@@ -85,9 +85,9 @@ def count_crossings(descriptor, points, axis, middle, rows, out, stack, begin):
     """Winding numbers (or ON_FACE, or UNDECIDED_COUNT) for ``points`` (n, 3), from row ``begin`` on, to
     ``out[rows[i]]``, int32.
 
-    The half-lines go along ``axis``, up from ``middle`` (in the tree's units) on and else down: the shorter way.
-    ``stack`` is memory for ``walk.stack_size`` int64. Returns the row before which it ended: early after WORK, so
-    that Ctrl-C need not wait for long.
+    The half-lines follow ``axis``, upwards above ``middle`` (in the tree's units) and downwards below: the shorter way.
+    ``stack`` is memory for ``walk.stack_size`` int64. Returns the row before which it ended, early after WORK, so that
+    Ctrl-C need not wait.
     """
     tree, parts = tree_pointers(descriptor), local_doubles()
     scale, axis_x, axis_y = tree.scale, (axis + 1) % 3, (axis + 2) % 3
@@ -127,7 +127,7 @@ def _visit(tree, query, first, count, found):
 
 @inlined
 def _meet_boxes(nodes, base, ray):
-    """The bits of the octants that a ray meets; boxes are only ever too large."""
+    """The bits of the octants that a ray enters; boxes are only ever too large."""
     # A node's rows, lower and upper, are four times as long as a block's.
     x, y, z = base + 4 * ray.row_x, base + 4 * ray.row_y, base + 4 * ray.row_z
     meets = (load8(nodes, x) <= splat8(round_up(ray.x))) & (load8(nodes, x + 8) >= splat8(round_down(ray.x)))
@@ -140,7 +140,7 @@ def _meet_boxes(nodes, base, ray):
 
 @inlined
 def _cross_blocks(tree, query, first, count, found):
-    """``found`` and the crossings with the faces of some blocks."""
+    """``found`` plus the crossings with the faces of some blocks."""
     ray, parts, winding, on = query.ray, query.parts, found.winding, found.on
     store(parts, PARTS, load(parts, PARTS) + count)
     for block in range(first, first + count):
@@ -159,7 +159,9 @@ def _cross_blocks(tree, query, first, count, found):
 
 @inlined
 def _cross_block(tree, base, ray):
-    """Bits of four faces: the surely crossed, those that float64 cannot decide, and where the winding rises by one."""
+    """Bits of four faces: those certainly crossed, those that float64 cannot decide, and those where the winding number
+    rises by one.
+    """
     x0, x1, x2, y0, y1, y2, z0, z1, z2 = load_corners(tree, base, ray)
     x, y, z = splat4(ray.x), splat4(ray.y), splat4(ray.z)
     x0, x1, x2, y0, y1, y2, z0, z1, z2 = x0 - x, x1 - x, x2 - x, y0 - y, y1 - y, y2 - y, z0 - z, z1 - z, z2 - z
@@ -200,7 +202,7 @@ def _corner(tree, place, ray):
 
 @kernel
 def _cross_exactly(tree, place, ray, parts):
-    """The change of the winding number at one face, 0 where it is not crossed, and whether the point lies on it."""
+    """The change of the winding number at one face, 0 if it is not crossed, and whether the point lies on it."""
     a, b, c = _corner(tree, place, ray), _corner(tree, place + 12, ray), _corner(tree, place + 24, ray)
     p = ray.x, ray.y, ray.z
     s0, s1, s2 = area_sign(b, c, p, parts), area_sign(c, a, p, parts), area_sign(a, b, p, parts)
@@ -231,7 +233,7 @@ def _cross_exactly(tree, place, ray, parts):
 
 @inlined
 def _moved_sign(a, b):
-    """The sign of (a - p) x (b - p) where it is 0 and p moves by (e, e^2)."""
+    """The sign of (a - p) x (b - p) if it is 0 and p moves by (e, e^2)."""
     if a[1] != b[1]:
         return 1 if a[1] > b[1] else -1
     if a[0] != b[0]:

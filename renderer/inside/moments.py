@@ -1,4 +1,4 @@
-"""The series of all octants of a tree, made once: those of leaves from their faces, then those of nodes from below."""
+"""The series of all octants of a tree, computed once: leaves from their faces, then nodes from their children."""
 
 import math
 from typing import NamedTuple
@@ -47,7 +47,7 @@ class Scratch(NamedTuple):
     """Memory of one thread.
 
     total, other, work  (ORDER + 1, ORDER + 2) complex, series
-    stack, leaves       int64: the nodes that wait, and the leaves below an octant
+    stack, leaves       int64: the waiting nodes, and the leaves below an octant
     """
 
     total: NDArray[np.complex128]
@@ -58,7 +58,7 @@ class Scratch(NamedTuple):
 
 
 class _Axes(NamedTuple):
-    """The rows of a block that have each axis, as ``load_corners`` wants them."""
+    """The rows of a block for each axis, as ``load_corners`` takes them."""
 
     row_x: int
     row_y: int
@@ -66,7 +66,7 @@ class _Axes(NamedTuple):
 
 
 def moments_of(tree: Tree, threads: int) -> NDArray[np.float64]:
-    """(nodes * MOMENT_WORDS,) float64: the rows of ``multipoles`` of each node, kept as long as the tree is."""
+    """(nodes * MOMENT_WORDS,) float64: the rows of ``multipoles`` of each node, kept with the tree."""
     kept = _KEPT.get(tree)
     return kept if kept is not None else _KEPT.setdefault(tree, _computed(tree, threads))
 
@@ -89,7 +89,7 @@ def _computed(tree: Tree, threads: int) -> NDArray[np.float64]:
 
 
 def _leaf_count(tree: Tree) -> int:
-    """The number of leaves, counted: in a file that was forged they may be more than there are blocks."""
+    """The number of leaves, counted, because a forged file may have more leaves than blocks."""
     links = tree.links.reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8]
     return int((links < 0).sum())
 
@@ -151,7 +151,7 @@ def _list_leaves(tree, link, scratch):
 
 @kernel
 def _measure(tree, scratch, count, rows, base):
-    """Write what an octant's faces are like; returns their centre and radius."""
+    """Write an octant's size and spread. Returns the centre and radius of its faces."""
     first, _ = blocks_of(scratch.leaves[0])
     centre, size = _centre(tree, scratch, count, corner(tree, first * BLOCK_WORDS))
     radius = maximum(np.sqrt(_farthest(tree, scratch, count, centre)) * _MORE, _LEAST)
@@ -167,7 +167,7 @@ def _measure(tree, scratch, count, rows, base):
 
 @kernel
 def _centre(tree, scratch, count, near):
-    """The mean of the faces by size, and their size; ``near`` is one of their corners."""
+    """The mean of the faces weighted by size, and their total size; ``near`` is one of their corners."""
     zero = splat4(0.0)
     x, y, z, total = zero, zero, zero, zero
     for k in range(count):
@@ -232,7 +232,7 @@ def _faces(tree, block, centre):
 
 @inlined
 def _sizes(a, b, c):
-    """Half the products of two sides of four faces, and their areas, not less than they are."""
+    """Half the products of two sides of four faces, and upper bounds of their areas."""
     zero, one = splat4(0.0), splat4(1.0)
     b, c = (b[0] - a[0], b[1] - a[1], b[2] - a[2]), (c[0] - a[0], c[1] - a[1], c[2] - a[2])
     long_b, long_c = square_root(_square(b)), square_root(_square(c))

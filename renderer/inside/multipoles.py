@@ -1,9 +1,9 @@
-"""Series of solid harmonics for the winding number of faces that are far away, with a bound of what they leave out.
+"""Series of solid harmonics for the winding number of far faces, with a bound of the truncation error.
 
 The winding number of faces around p is a dipole potential: 1/(4 pi) of the integral of -grad 1/|x - p| along the
 normals. About a centre c, within r = |x - c| and beyond it R = |p - c|, 1/|x - p| is the sum of r^n / R^(n+1) P_n over
-all orders n. A series keeps the orders from 1 to ORDER as 2 n + 1 numbers each. No gradient of r^n P_n exceeds
-n r^(n-1) (Bernstein and Szego), so orders above N = ORDER leave out, with s the largest r and q = s / R, at most
+all orders n. A series keeps the orders from 1 to ORDER as 2 n + 1 numbers each. No gradient of r^n P_n exceeds n
+r^(n-1) (Bernstein and Szego). With s the largest r, q = s / R and N = ORDER, the orders above N therefore add at most
 
     1/(4 pi R^2) * integral of (r / R)^N * (N + 1 - N q) / (1 - q)^2.
 
@@ -34,7 +34,7 @@ ROUNDING = 2.0**-40
 
 @inlined
 def row_of(n, m):
-    """The row of the real coefficient of order n and degree m; the imaginary one follows where m > 0."""
+    """The row of the real coefficient of order n and degree m; the imaginary one follows if m > 0."""
     return COEFFICIENTS + n - 1 if m == 0 else COEFFICIENTS + ORDER + (m - 1) * (2 * ORDER + 2 - m) + 2 * (n - m)
 
 
@@ -46,9 +46,10 @@ def sum_lanes(four):
 
 @inlined
 def see_octants(rows, base, point, share):
-    """A node's octants, whose rows begin at ``base``, from a point: bits, winding numbers and their bounds, four sums.
+    """A node's octants, whose rows begin at ``base``, seen from a point: bits, winding numbers and their bounds, four
+    sums.
 
-    The bits are those of octants too near: their bound would exceed ``share`` of their size over the squared distance.
+    The bits are of octants too near: their bound exceeds ``share`` of their size over the squared distance.
     """
     low, values, bounds = _see_four(rows, base, point, share)
     high, more_values, more_bounds = _see_four(rows, base + 4, point, share)
@@ -130,8 +131,8 @@ def _lifted(series, n, m, v):
 def add_face(series, a, b, c, area, work):
     """Add the series of a face with this area vector; its corners a, b and c are relative to the centre.
 
-    The mean of a product (y . w)^k over the face is 2 k! / (k + 2)! times the sum of all products of degree k of the
-    corners', which come corner by corner.
+    The mean of (y . w)^k over the face is 2 k! / (k + 2)! times the sum of all products of degree k of the corners;
+    these are added corner by corner.
     """
     work[:] = 0.0
     work[0, 0] = 1.0
@@ -147,7 +148,7 @@ def add_face(series, a, b, c, area, work):
 
 @kernel
 def _multiply(series, v):
-    """Multiply a series by 1 / (1 - v . w) = 1 + v . w + (v . w)^2 ..., but for its last order."""
+    """Multiply a series by 1 / (1 - v . w) = 1 + v . w + (v . w)^2 ..., up to its last order."""
     for n in range(1, ORDER):
         for m in range(n + 1):
             series[n, m] += _lifted(series, n, m, v)
@@ -174,7 +175,7 @@ def add_shifted(series, other, shift, work):
 
 @kernel
 def put_series(rows, base, series):
-    """Write a series, its lengths in units of the radius, as the coefficients of the octant at ``base``."""
+    """Write a series, with lengths in units of the radius, as the coefficients of the octant at ``base``."""
     factor = -1.0 / (4.0 * math.pi)
     for n in range(1, ORDER + 1):
         factor *= 2.0 * n - 1.0

@@ -1,4 +1,4 @@
-"""What lies inside in rational arithmetic, for the few points whose products float64 cannot hold.
+"""Crossings and winding numbers in rational arithmetic, for the few points whose products float64 cannot represent.
 
 Crossings follow the rules of ``crossings``: signs of areas and volumes, and points on edges moved by (e, e^2). Winding
 numbers follow the formula of ``careful_angle``.
@@ -48,7 +48,7 @@ def _crossing(a: Vector, b: Vector, c: Vector) -> tuple[int, int]:
 
 
 def _on_upright(a: Vector, b: Vector, c: Vector) -> bool:
-    """Whether the point lies on a face that is seen as a line and whose plane it lies in."""
+    """Whether the point lies on a face that is seen as a line and whose plane contains the point."""
     informed = False
     for u, v in ((1, 2), (2, 0)):
         areas = [p[u] * q[v] - p[v] * q[u] for p, q in ((b, c), (c, a), (a, b))]
@@ -63,9 +63,9 @@ def _sign(x: Fraction) -> int:
 
 
 def winding_of(point: Floats, triangles: Floats) -> float:
-    """The winding number of triangles (F, 3 corners, 3) around a point (3,), each face to float64's digits.
+    """The winding number of triangles (F, 3 corners, 3) around a point (3,), each face to float64 precision.
 
-    Float64 measures the faces that no corner, edge or plane is near; exact products measure the others.
+    Float64 measures faces whose corners, edges and plane are far from the point; exact products measure the others.
     """
     huge = max(np.abs(point).max(), np.abs(triangles).max()) > _HUGE
     share = _LESS if huge else 1.0
@@ -101,7 +101,7 @@ def _cotangent(x: Vector, y: Vector) -> float:
 
 
 def _direction(a: Vector) -> Vector:
-    """A vector made of size one; it is not 0."""
+    """A vector, not 0, scaled to size one."""
     largest = max(abs(x) for x in a)
     x, y, z = (float(x / largest) for x in a)
     size = math.hypot(x, y, z)

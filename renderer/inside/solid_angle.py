@@ -1,8 +1,8 @@
 """Solid angles of faces, four at a time, summed as the angle of a product.
 
 Half the solid angle of a face is the angle of one complex number (van Oosterom and Strackee, The Solid Angle of a Plane
-Triangle, IEEE Transactions on Biomedical Engineering 30, 1983). So the product of these numbers has the sum of the
-angles, but for whole turns, which are counted where a product passes the negative axis: one arctangent a lane for all
+Triangle, IEEE Transactions on Biomedical Engineering 30, 1983). So the angle of their product is the sum of the angles,
+up to whole turns, which are counted when a product passes the negative axis. One arctangent a lane is enough for all
 faces.
 """
 
@@ -37,7 +37,7 @@ _TURN = 2.0 * math.pi
 
 
 class Turned(NamedTuple):
-    """A sum of half solid angles: the product of four lanes of numbers, their whole turns, and angles added apart."""
+    """A sum of half solid angles: the product of numbers in four lanes, its whole turns, and separate angles."""
 
     real: Any
     imaginary: Any
@@ -47,16 +47,16 @@ class Turned(NamedTuple):
 
 @inlined
 def no_turn():
-    """The sum of no angles."""
+    """The empty sum."""
     return Turned(splat4(1.0), splat4(0.0), splat4(0.0), 0.0)
 
 
 @kernel
 def add_blocks(tree, first, count, point, total, parts):
-    """``total`` and the angles of the faces of some blocks, seen from ``point``; ``parts`` is memory for an expansion.
+    """``total`` plus the angles of the faces of some blocks, seen from ``point``; ``parts`` is memory for an expansion.
 
-    A face that the point lies on counts 0, the mean of its two sides. The sum is NaN where products that measure a face
-    leave float64's range, for which it takes coordinates as unlike as 1 and 2^-300.
+    A face that contains the point counts 0, the mean of its two sides. The sum is NaN if products leave float64's
+    range, which takes coordinates as unlike as 1 and 2^-300.
     """
     apart = total.apart
     for block in range(first, first + count):
@@ -85,7 +85,7 @@ def turns_of(total):
 
 @inlined
 def _see_block(tree, base, point):
-    """The real and imaginary parts of four faces' numbers, and the mask of those that are sure."""
+    """The real and imaginary parts of four faces' numbers, and the mask of the certain ones."""
     x0, x1, x2, y0, y1, y2, z0, z1, z2 = load_corners(tree, base, point)
     px, py, pz = splat4(point.x), splat4(point.y), splat4(point.z)
     x0, y0, z0, share0 = _direction(x0 - px, y0 - py, z0 - pz)
@@ -109,7 +109,7 @@ def _direction(x, y, z):
 
 @inlined
 def _times(total, a, b):
-    """``total`` times a + b i, its product made of size one; no a + b i lies on the negative axis."""
+    """``total`` times a + b i, scaled to size one; no a + b i lies on the negative axis."""
     zero, one = splat4(0.0), splat4(1.0)
     x, y = total.real * a - total.imaginary * b, total.real * b + total.imaginary * a
     # Angles go from -pi, without it, to pi. Two of one sign pass pi where the sign of their sum is the other.
@@ -122,6 +122,6 @@ def _times(total, a, b):
 
 @kernel
 def _careful_angle(tree, place, point, parts):
-    """Half the solid angle of one face to float64's digits, however near to the point its edges are."""
+    """Half the solid angle of one face to float64 precision, however near its edges are."""
     p = point.x, point.y, point.z
     return careful_angle(corner(tree, place), corner(tree, place + 12), corner(tree, place + 24), p, parts)

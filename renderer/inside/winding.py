@@ -1,12 +1,13 @@
-"""Winding numbers of any mesh around points: checks at the boundary, chunks on threads."""
+"""The query ``winding_number``: checks, and chunks of points on threads."""
 
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from renderer.arguments.arrays import real_argument
 from renderer.arguments.points import check_points
+from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.inside.moments import moments_of
 from renderer.inside.rational import winding_of
@@ -38,7 +39,7 @@ def exceeds_half(tree: Tree, mesh: Mesh, rows: Floats, threads: int) -> NDArray[
 
 
 def _numbers(tree: Tree, mesh: Mesh, points: Floats, tolerance: float, threads: int) -> Floats:
-    """Winding numbers (n,) within a tolerance, see ``find_windings``; by rational arithmetic where that leaves NaN."""
+    """Winding numbers (n,) within a tolerance, see ``find_windings``; by rational arithmetic where that returns NaN."""
     moments, numbers = moments_of(tree, threads), np.empty(len(points))
     least = _LEAST if tree.has_nodes else min(_LEAST, rays_against_blocks(tree))
 

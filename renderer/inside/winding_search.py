@@ -1,4 +1,4 @@
-"""Winding numbers by a search through the tree: series of octants that are far enough, and single faces near by."""
+"""Winding numbers by a traversal of the tree: series for far octants, single faces near by."""
 
 from typing import Any, NamedTuple
 
@@ -29,11 +29,10 @@ _FIRST_SIDE, _NEXT_SIDE = 1.0, 2.0**-4
 @kernel
 def find_windings(descriptor, rows, points, tolerance, out, stack, begin, end):
     """Write the winding numbers around the points begin:end of ``points`` (n, 3) to ``out`` (n,), within ``tolerance``;
-    for SIDE_OF_HALF numbers that are above 1/2 where they are, and else not.
+    for SIDE_OF_HALF, numbers on the right side of 1/2.
 
-    They are NaN where float64's range does not hold what decides them, see ``add_blocks``. ``rows`` is what
-    ``moments_of`` has for the tree, ``stack`` memory for ``walk.stack_size`` int64. Returns the row before which it
-    ended: early after _WORK.
+    They are NaN if products leave float64's range, see ``add_blocks``. ``rows`` is ``moments_of`` the tree, ``stack``
+    memory for ``walk.stack_size`` int64. Returns the row before which it ended, early after _WORK.
     """
     tree, rows, stack, parts = tree_pointers(descriptor), pointer(rows), pointer(stack), local_doubles()
     work, first_share = np.int64(0), _FIRST_SIDE if tolerance < 0.0 else _FIRST * tolerance
@@ -58,7 +57,7 @@ def find_windings(descriptor, rows, points, tolerance, out, stack, begin, end):
 
 @inlined
 def _is_open(number, bound, tolerance):
-    """Whether a number with a bound of its error leaves the question open."""
+    """Whether a number with a bound of its error leaves the answer undecided."""
     return abs(number - 0.5) <= bound if tolerance < 0.0 else bound > tolerance
 
 
@@ -70,7 +69,7 @@ def _point_at(tree, row):
 
 @inlined
 def _is_held(tree, row, point):
-    """Whether the tree's units hold a point exactly; far away they need not."""
+    """Whether the tree's units represent a point exactly; far away they need not."""
     return (
         _keeps(tree, load(row, 0), point.x) & _keeps(tree, load(row, 1), point.y) & _keeps(tree, load(row, 2), point.z)
     )
@@ -83,14 +82,14 @@ def _keeps(tree, x, scaled):
 
 @inlined
 def _within(x):
-    """No farther than products allow: so far away all winding numbers are 0 to 2^-100."""
+    """The coordinate clamped to a range without overflow; beyond it all winding numbers are 0 to 2^-100."""
     return maximum(-FARTHEST, minimum(FARTHEST, x))
 
 
 class _Query(NamedTuple):
-    """A point, and ``share``, which says how near to it a series is evaluated.
+    """A point, and ``share``, which limits how near to it a series is used.
 
-    rows   pointer to what ``moments_of`` has for the tree
+    rows   pointer to ``moments_of`` the tree
     parts  memory for an expansion
     """
 
@@ -101,8 +100,8 @@ class _Query(NamedTuple):
 
 
 class _Sums(NamedTuple):
-    """Sums so far: of the solid angles of single faces, of series and of the bounds of their errors, four lanes each;
-    and the number of nodes and blocks that they took.
+    """Sums so far: of the solid angles of single faces, of series, and of the bounds of their errors, four lanes each;
+    and the number of nodes and blocks visited.
     """
 
     angles: Turned
@@ -113,7 +112,7 @@ class _Sums(NamedTuple):
 
 @kernel
 def _search(tree, query, stack):
-    """The winding number and a bound of its error, and the number of nodes and blocks that it took."""
+    """The winding number, a bound of its error, and the number of nodes and blocks visited."""
     sums = walk(tree, stack, query, _Sums(no_turn(), splat4(0.0), splat4(0.0), np.int64(0)), _add_series, _add_leaf)
     return sum_lanes(sums.values) + turns_of(sums.angles), sum_lanes(sums.bounds), sums.steps
 

@@ -1,1 +1,1 @@
-"""Kernels: how they are compiled, kept on disk and found again."""
+"""Kernels: compiling them, and keeping them on disk."""

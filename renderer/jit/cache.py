@@ -1,8 +1,8 @@
 """Compiled kernels on disk: one file for each kernel, argument types, sources, Python, Numba and processor.
 
-Files are found by their names, so there is no index to keep in step. A file that cannot be read counts as absent, and a
-kernel that cannot be written is compiled in each process; neither stops a run. A folder made ahead of time
-(``octree-render compile -o FOLDER``) is only read, after the user's own.
+Files are found by name, without an index. An unreadable file counts as absent, and a kernel that cannot be written is
+compiled in each process; neither stops a run. A folder compiled ahead (``octree-render compile -o FOLDER``) is only
+read, after the user's own.
 """
 
 import hashlib
@@ -42,7 +42,9 @@ _LOG = getLogger("renderer.jit")
 
 @dataclass(frozen=True)
 class Folders:
-    """The folders for kernels of one source folder: ``written`` (None where nothing can be), and all that are read."""
+    """The folders for kernels of one source folder: ``written`` (None if nothing can be written), and all that are
+    read.
+    """
 
     written: Path | None
     read: tuple[Path, ...]
@@ -68,16 +70,16 @@ class KernelStore:
 
     @lazy
     def _digest(self) -> str | None:
-        """The digest of all that the kernel's code depends on: the text of files. None where that is not known.
+        """The digest of the files that the kernel's code depends on; None if that is unknown.
 
-        A function within another stands for many, which no text tells apart.
+        A nested function stands for many functions of the same text.
         """
         return None if "<locals>" in self._function.__qualname__ else source_digest(self._source)
 
     def is_stored(self) -> bool:
-        """Whether a file of these sources is there for any types of arguments, so that a later run need not compile.
+        """Whether a file of these sources exists for any argument types, so that a later run need not compile.
 
-        True, too, where nothing can be written: then no process can help another.
+        Also True if nothing can be written: then no process can help another.
         """
         folders = _folders(self._home)
         if folders.written is None or self._digest is None:
@@ -86,7 +88,7 @@ class KernelStore:
         return any(name.startswith(begin) for folder in (*folders.read, *ahead_folders()) for name in _names(folder))
 
     def load_overload(self, signature: Any, context: Any) -> CompileResult | None:
-        """The kernel compiled for the types in ``signature``, or None where it must be compiled."""
+        """The kernel compiled for the types in ``signature``, or None if it must be compiled."""
         if self._digest is None:
             return None
         for path, key in self._places(signature, context.codegen().magic_tuple()):
@@ -97,7 +99,7 @@ class KernelStore:
         return None
 
     def save_overload(self, signature: Any, compiled: CompileResult) -> None:
-        """Keep a kernel for later processes, and remove those that were compiled from other sources."""
+        """Write a kernel for later processes, and remove those compiled from other sources."""
         folder = _folders(self._home).written
         if folder is None or self._digest is None or compiled.library.has_dynamic_globals:
             _Count.lost += 1
@@ -139,28 +141,28 @@ class KernelStore:
 
 
 def keep_in(folder: Path) -> None:
-    """From now on keep compiled kernels in ``folder`` alone, and look for them nowhere else."""
+    """From now on, write and read compiled kernels only in ``folder``."""
     _Chosen.folders = Folders(folder, (folder,))
 
 
 def ahead_folders() -> tuple[Path, ...]:
-    """Folders of kernels compiled ahead that exist: those of the environment, then the package's own."""
+    """The existing folders of kernels compiled ahead: those of the environment, then the package's own."""
     return () if _Chosen.folders else _named_folders()
 
 
 def lost() -> int:
-    """The number of kernels that this process compiled and could not keep."""
+    """The number of kernels that this process compiled and could not write."""
     return _Count.lost
 
 
 class _Count:
-    """The number of kernels that could not be kept."""
+    """The number of kernels that could not be written."""
 
     lost = 0
 
 
 class _Chosen:
-    """The folders that ``keep_in`` chose, None for the usual ones."""
+    """The folders chosen by ``keep_in``, None for the usual ones."""
 
     folders: Folders | None = None
 
@@ -204,13 +206,13 @@ def _hash(key: tuple[str, ...]) -> str:
 
 
 def _folders(sources: Path) -> Folders:
-    """The folders in which kernels of the sources in one folder are kept and looked for."""
+    """The folders in which kernels of one source folder are written and read."""
     return _Chosen.folders or _usual_folders(sources)
 
 
 @cache
 def _usual_folders(sources: Path) -> Folders:
-    """The folder that NUMBA_CACHE_DIR names, alone if it can be written; else the sources' own and the user's too."""
+    """The folder in NUMBA_CACHE_DIR alone, if it can be written; else the sources' own and the user's."""
     own, places = f"{sources.name}_{hashlib.sha256(os.fsencode(sources)).hexdigest()[:16]}", []
     if config.CACHE_DIR:
         chosen = Path(config.CACHE_DIR).absolute() / own
@@ -233,7 +235,7 @@ def _user_cache() -> Path:
 
 
 def _is_folder(path: Path) -> bool:
-    """``path.is_dir()``, and False where this user has no access."""
+    """``path.is_dir()``, or False if this user has no access."""
     try:
         return path.is_dir()
     except OSError:
@@ -257,7 +259,7 @@ def _names(folder: Path) -> list[str]:
 
 
 def _read(path: Path, key: tuple[str, ...]) -> Any:
-    """The content of a file, or None where it is absent, damaged or of another key."""
+    """The content of a file, or None if it is absent, damaged or of another key."""
     try:
         if not S_ISREG(path.stat().st_mode):  # reading a pipe would wait
             return None
@@ -279,7 +281,7 @@ def _read(path: Path, key: tuple[str, ...]) -> Any:
 
 @contextmanager
 def _tolerant(path: Path) -> Iterator[None]:
-    """A context in which an error means that a stored kernel is of no use: it is logged once."""
+    """A context in which an error means that a stored kernel is unusable; it is logged once."""
     try:
         yield
     except Exception as error:
@@ -298,7 +300,7 @@ _said: set[str] = set()
 
 
 def _warn_once(kind: str, message: str) -> None:
-    """Log the first message of each kind: a fault of one kernel's file is mostly a fault of all."""
+    """Log the first message of each kind: if one kernel's file has a fault, most have it."""
     if kind not in _said:
         _said.add(kind)
         _LOG.warning(message)

@@ -1,12 +1,12 @@
-"""Kernels through Numba at a third of its usual cost: only what Python calls is optimised and compiled.
+"""Compiles kernels by Numba at a third of its usual cost: only what Python calls is optimised and compiled.
 
-Numba takes each function, however small, through its whole pipeline: LLVM optimises and compiles it alone, again within
-each of its callers, and a wrapper lets Python call it. Here a function that kernels call stays a *piece*: typed and
-lowered to LLVM's code, but not optimised. A function that Python calls is an *entry*: its piece and all below it linked
-into one module, which LLVM optimises once.
+Numba takes each function, however small, through its whole pipeline: LLVM optimises and compiles it alone, then again
+in each of its callers, and a wrapper lets Python call it. Here a function called by kernels stays a *piece*: typed and
+lowered to LLVM code, but not optimised. A function called by Python is an *entry*: its piece and all pieces below it,
+linked into one module that LLVM optimises once.
 
-This relies on Numba's internals, which ``probe`` tests. ``jit`` calls it for versions of Numba that were not tested,
-and does without this module where it fails.
+This relies on Numba's internals. For untested versions of Numba, ``decorators`` calls ``probe``, and does without this
+module if that fails.
 """
 
 import os
@@ -39,7 +39,7 @@ from renderer.jit.notice import compiling
 from renderer.lazy import lazy
 
 # No array is allocated in a kernel, so none counts references: Numba's counts take a locked instruction each.
-# Every option is set, because Numba would take an unset one from the kernel whose compiling asked for this one.
+# Every option is set, because Numba would copy an unset one from the kernel that calls this one.
 if hasattr(os, "register_at_fork"):
     # A child forked while another thread compiles or loads would wait for ever for Numba's lock.
     os.register_at_fork(
@@ -59,7 +59,7 @@ OPTIONS = {
 
 
 class _PieceLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """A function's module as it was lowered, neither optimised nor compiled."""
+    """A function's module as lowered, neither optimised nor compiled."""
 
     _merged: Any = None
 
@@ -70,7 +70,7 @@ class _PieceLibrary(JITCodeLibrary):  # type: ignore[misc]
         self._finalized = True
 
     def _get_module_for_linking(self) -> Any:
-        """This module with all below it, for kernels that Numba compiles by itself."""
+        """This module with all below it, for kernels that Numba compiles without this module."""
         if self._merged is None:
             module = self._final_module.clone()
             _link_all(module, self._linking_libraries)
@@ -115,7 +115,7 @@ class _EntryLibrary(JITCodeLibrary):  # type: ignore[misc]
 
 
 def _link_all(module: Any, libraries: list[Any]) -> None:
-    """Link libraries and all that they are linked with into ``module``, each once."""
+    """Link libraries and their dependencies into ``module``, each once."""
     done: set[int] = set()
     pending = list(libraries)
     while pending:
@@ -132,7 +132,7 @@ def _link_all(module: Any, libraries: list[Any]) -> None:
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _LowerPiece(NativeLowering):  # type: ignore[misc]
-    """Lower a function for other kernels alone."""
+    """Lower a function for kernels only."""
 
     _name = "renderer_lower_piece"
 
@@ -149,7 +149,7 @@ class _LowerPiece(NativeLowering):  # type: ignore[misc]
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _LinkEntry(LoweringPass):  # type: ignore[misc]
-    """Make a function's piece one that Python can call."""
+    """Make a function's piece callable by Python."""
 
     _name = "renderer_link_entry"
 
@@ -227,14 +227,14 @@ def _pipeline(name: str, passes: tuple[Any, ...]) -> PassManager:
 
 
 class _Piece(CPUDispatcher):  # type: ignore[misc]
-    """A function as kernels call it."""
+    """A function as other kernels call it."""
 
     def add_overload(self, compiled: Any) -> None:
         # Left out of the dispatcher's table of functions that Python may call.
         self.overloads[tuple(compiled.signature.args)] = compiled
 
     def compiled(self, arguments: Any) -> Any:
-        """The compiled piece for arguments of these types; compiles it if it was not compiled before."""
+        """The piece compiled for arguments of these types; compiles it if needed."""
         self.compile(tuple(arguments))
         return self.overloads[tuple(arguments)]
 
@@ -245,10 +245,9 @@ class _Piece(CPUDispatcher):  # type: ignore[misc]
 
 
 class Kernel:
-    """A function that Python and kernels call; its dispatcher for each is made at the first use.
+    """A function for Python and for kernels; its dispatcher for each is created at the first use.
 
-    Numba's dispatchers take a third of a millisecond to make, and most kernels are never called by Python, nor by
-    kernels that are compiled now.
+    Creating a Numba dispatcher takes a third of a millisecond, and most kernels need none in a process.
     """
 
     def __init__(self, function: Callable[..., Any], forceinline: bool = False, kept: bool = True) -> None:
@@ -281,7 +280,7 @@ class Kernel:
 
     @property
     def _numba_type_(self) -> Any:
-        """Its type in a kernel that calls it, which Numba asks for."""
+        """Its type in a kernel that calls it, read by Numba."""
         return types.Dispatcher(self.piece)
 
     def notice(self) -> AbstractContextManager[None]:
@@ -293,7 +292,7 @@ _kernels: dict[Callable[..., Any], Kernel] = {}
 
 
 def probe() -> None:
-    """Compile, call, store and load a kernel that calls another; raises an error where this Numba does not fit."""
+    """Compile, call, store and load a kernel that calls another; raises an error if this Numba does not fit."""
 
     def doubled(x):  # type: ignore[no-untyped-def]
         return x + x

@@ -1,8 +1,8 @@
-"""The decorators that make a kernel: no GIL, no fastmath, C's rules for division, machine code kept on disk.
+"""The decorators of kernels: no GIL, no fastmath, C's rules for division, machine code kept on disk.
 
-A kernel is called by Python and by other kernels alike. It allocates nothing and raises nothing; the caller keeps its
-arrays alive. A kernel may stand in another package too: its machine code then follows the edits of its own file and of
-all files of this package, but not those of other files that it imports. One within a function is never kept.
+Python and other kernels call a kernel alike. It allocates nothing and raises nothing; the caller keeps its arrays
+alive. In another package, a kernel is compiled again after edits of its own file or of this package, but not of other
+files that it imports. A nested kernel is never kept on disk.
 """
 
 from collections.abc import Callable
@@ -22,14 +22,14 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """A kernel that LLVM must inline: for the innermost loops, whose vectors a call would pass through memory."""
+    """A kernel that LLVM must inline: for innermost loops, whose vectors a call would pass through memory."""
     return _decorated(function, forceinline=True)
 
 
 def is_on_disk(kernel: Any) -> bool:
-    """Whether a kernel is kept for some types of arguments, so that another process need not compile it.
+    """Whether a kernel is on disk for some argument types, so that another process need not compile it.
 
-    True, too, where nothing can be kept: then no process can help another.
+    Also True if nothing can be kept: then no process can help another.
     """
     store = getattr(kernel, "store", None)
     return store is None or bool(store.is_stored())
@@ -44,7 +44,7 @@ def _decorated(function: Callable[..., Any], forceinline: bool) -> Any:
 
 @cache
 def _compiler() -> Any:
-    """The module ``compiler``, or None where it does not fit this version of Numba, which is logged once."""
+    """The module ``compiler``, or None if it does not fit this version of Numba, which is logged once."""
     if numba.config.DISABLE_JIT:
         raise ImportError("renderer: NUMBA_DISABLE_JIT is set, but kernels run only compiled: unset it")
     try:

@@ -1,4 +1,4 @@
-"""Digests of kernel sources, by which compiled kernels are found again: an edit below a kernel changes its digest."""
+"""Digests of kernel sources, in the names of compiled kernels: an edit of an imported file changes the digest."""
 
 import hashlib
 import re
@@ -20,11 +20,11 @@ def is_ours(path: Path) -> bool:
 
 @cache
 def source_digest(path: Path) -> str | None:
-    """Hex digest of a source file and of everything it imports from this package, directly or not, at any depth.
+    """Hex digest of a source file and of all files of this package that it imports, at any depth.
 
-    For a file outside the package: of that file and of the whole package. None, which is logged once, where the file
-    cannot be read, as in a zip, or where one has been written since this process loaded the package: the code that runs
-    may then differ from the file.
+    For a file outside the package: of that file and the whole package. None, logged once, if the file cannot be read,
+    as in a zip, or if a file was written after this process loaded the package: the code that runs may then differ from
+    it.
     """
     path = path.resolve()
     seen = reached([path] if is_ours(path) else [path, *PACKAGE.rglob("*.py")])
@@ -41,7 +41,7 @@ def source_digest(path: Path) -> str | None:
 
 
 def reached(files: Iterable[Path]) -> set[Path]:
-    """Those of the files that are there, and all of this package that they import, directly or not."""
+    """The existing ones of some files, and all files of this package that they import, directly or not."""
     seen: set[Path] = set()
     pending = list(files)
     while pending:
@@ -64,7 +64,7 @@ def _source(path: Path) -> bytes:
 
 @cache
 def imported_files(path: Path) -> list[Path]:
-    """The files of the package that a source imports by ``from renderer.a.b import c``, c a module or a name in b."""
+    """The files of the package that a source imports by ``from renderer.a.b import c``; c: a module or a name in b."""
     found = []
     for module, names in _IMPORT.findall(_source(path).decode(errors="replace")):
         base = PACKAGE.joinpath(*module.split(".")[1:])

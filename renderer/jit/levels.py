@@ -1,4 +1,4 @@
-"""Levels of processors that kernels can be compiled ahead for, without an import of the compiler."""
+"""Levels of processors for compiling kernels ahead; does not import the compiler."""
 
 # Folders of kernels compiled ahead, separated as in PATH.
 AHEAD_VARIABLE = "OCTREE_RENDERER_KERNELS"
@@ -14,7 +14,7 @@ FEATURES = {"x86-64-v4": _V4, "x86-64-v3": _V3, "x86-64-v2": _V2, "aarch64": ("n
 
 
 def lacking(level: str) -> list[str]:
-    """The features of a level that this machine has not."""
+    """The features of a level that this machine lacks."""
     # Of the compiler's parts only that which knows the processor.
     from llvmlite import binding  # type: ignore[import-untyped]
 

@@ -1,4 +1,4 @@
-"""The time at which this process loaded the package; a source that is newer on disk is not the one that runs."""
+"""The time at which this process loaded the package; a source newer on disk is not the one that runs."""
 
 import time
 

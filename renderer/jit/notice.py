@@ -1,6 +1,6 @@
-"""Messages about compiling, and the time that it takes: one line on standard error, each kernel at level INFO.
+"""Messages about compiling and its time: one line on standard error, each kernel at level INFO.
 
-The line comes from the logger ``renderer.jit`` at level WARNING, which Python prints where logging is not configured;
+The line comes from the logger ``renderer.jit`` at level WARNING, which Python prints if logging is not configured;
 ``logging.getLogger("renderer").setLevel("ERROR")`` or the environment variable OCTREE_RENDERER_QUIET=1 turns it off.
 """
 
@@ -28,7 +28,7 @@ def compile_seconds() -> float:
 
 
 class Stopwatch:
-    """Seconds since it was made, less those that this process spent compiling, on any thread."""
+    """Seconds since it was created, without those that this process spent compiling, on any thread."""
 
     def __init__(self) -> None:
         self._began = time.perf_counter() - compile_seconds()
@@ -40,7 +40,7 @@ class Stopwatch:
 
 @contextmanager
 def compiling(name: str, folder: str | None) -> Iterator[None]:
-    """A context for the compiling of one kernel: logs it, and adds its time to ``compile_seconds``."""
+    """A context for compiling one kernel: logs it, and adds its time to ``compile_seconds``."""
     kept = f"once, kept in {folder}" if folder else "for this process only: no cache folder can be written"
     if _Clock.kernels == 0 and os.environ.get(QUIET_VARIABLE, "0") in ("", "0"):
         _LOG.warning("renderer: compiling kernels, which takes some seconds (%s)", kept)

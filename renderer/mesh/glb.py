@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from renderer.errors import MeshError
-from renderer.mesh.mesh import Mesh, Repairs, build_mesh
+from renderer.mesh.foreign import attributes_of
+from renderer.mesh.mesh import Mesh, Repairs, build_mesh, give_parts
+from renderer.mesh.parts import Part, parts_of
 
 # glTF 2.0, section 5.24.4, and the extensions that pack vertices.
 _TRIANGLES, _TRIANGLE_FAN = 4, 6
@@ -31,16 +33,18 @@ def parse_glb(content: bytes, repairs: list[Repairs] | None = None) -> Mesh:
     document = _checked_document(content)
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # a signalling NaN, which Mesh rejects or repairs
-            scene = trimesh.load_scene(
-                BytesIO(_one_primitive_a_node(content, document)), file_type="glb", process=False
-            )
-        meshes = []
+            names = _node_names(document)
+            plain, owners = _one_primitive_a_node(content, document)
+            scene = trimesh.load_scene(BytesIO(plain), file_type="glb", process=False)
+        meshes, nodes = [], []
         for node in scene.graph.nodes_geometry:
             transform, geometry_name = scene.graph[node]
             geometry = scene.geometry[geometry_name]
             if isinstance(geometry, trimesh.Trimesh):
-                meshes.append(_from_trimesh(geometry, repairs).transformed(transform))
-        return Mesh.concatenate(meshes)
+                mesh = build_mesh(repairs, geometry.vertices, geometry.faces, **attributes_of(geometry))
+                meshes.append(mesh.transformed(transform))
+                nodes.append(owners[int(node)])
+        return give_parts(Mesh.concatenate(meshes), _parts(meshes, nodes, names))
     except MeshError:
         raise
     except Exception as error:  # a library on malformed input raises anything: KeyError, struct.error, ...
@@ -63,33 +67,53 @@ def _checked_document(content: bytes) -> Any:
     return document
 
 
-def _one_primitive_a_node(content: bytes, document: Any) -> bytes:
-    """The file with a node of its own for each primitive of a mesh that has several.
+def _node_names(document: Any) -> list[str]:
+    """The name of each node, or of its mesh where it has none."""
+    meshes, names = document.get("meshes") or [], []
+    for node in document.get("nodes") or []:
+        mesh = meshes[node["mesh"]] if "mesh" in node else {}
+        names.append(str(node.get("name") or mesh.get("name") or ""))
+    return names
 
-    trimesh names their nodes at random, so that of thousands some have the same name, and one of these is lost.
+
+def _parts(meshes: list[Mesh], nodes: list[int], names: list[str]) -> tuple[Part, ...]:
+    """A part for each node, whose meshes follow each other."""
+    ends = np.cumsum([len(mesh.faces) for mesh in meshes]).tolist()
+    last = [k for k, node in enumerate(nodes) if nodes[k + 1 : k + 2] != [node]]
+    ends = [0, *(ends[k] for k in last)]
+    return parts_of([names[nodes[k]] for k in last], np.diff(ends).tolist())
+
+
+def _one_primitive_a_node(content: bytes, document: Any) -> tuple[bytes, list[int]]:
+    """The file with a node of its own for each primitive of a mesh that has several, and the node that each is of.
+
+    trimesh names the nodes of several primitives at random, so that of thousands some have the same name, and one of
+    these is lost. Each node gets its number for a name.
     """
-    meshes, nodes = document.get("meshes"), document.get("nodes")
+    meshes, nodes = document.get("meshes"), document.get("nodes") or []
     several = {i: mesh["primitives"] for i, mesh in enumerate(meshes or []) if len(mesh["primitives"]) > 1}
-    if not several:
-        return content
+    owners = list(range(len(nodes)))
     first: dict[int, int] = {}
     for i, primitives in several.items():
         first[i] = len(meshes)
         meshes += [{"primitives": [primitive]} for primitive in primitives]
-    for node in list(nodes):
+    for number, node in enumerate(list(nodes)):
         if node.get("mesh") in several:
             i = node.pop("mesh")
             count = len(several[i])
             # The last comes first.
             node["children"] = [*node.get("children", []), *reversed(range(len(nodes), len(nodes) + count))]
             nodes += [{"mesh": first[i] + k} for k in range(count)]
+            owners += [number] * count
     for i in several:
         meshes[i]["primitives"] = meshes[i]["primitives"][:1]
+    for number, node in enumerate(nodes):
+        node["name"] = str(number)
     text = json.dumps(document).encode()
     text += b" " * (-len(text) % 4)
     rest = content[20 + int.from_bytes(content[12:16], "little") :]
     length = 20 + len(text) + len(rest)
-    return b"".join((content[:8], struct.pack("<II", length, len(text)), content[16:20], text, rest))
+    return b"".join((content[:8], struct.pack("<II", length, len(text)), content[16:20], text, rest)), owners
 
 
 def _refuse_unread(document: Any) -> None:
@@ -157,13 +181,3 @@ def _refuse_deep(nodes: list[dict[str, Any]]) -> None:
         level = {child for number in level for child in children[number] if 0 <= child < len(nodes)}
     if level or seen < len(nodes):
         raise MeshError(f"GLB: expected nodes at most {_MAX_NODE_DEPTH} deep and without circles, got others")
-
-
-def _from_trimesh(geometry: Any, repairs: list[Repairs] | None) -> Mesh:
-    # trimesh computes normals when asked; only those that stood in the file are in its cache.
-    normals = geometry.vertex_normals if "vertex_normals" in geometry._cache else None
-    colors = None
-    if geometry.visual.kind == "vertex":
-        colors = (np.asarray(geometry.visual.vertex_colors)[:, :3] / 255).astype(np.float32)
-    texcoords = getattr(geometry.visual, "uv", None)
-    return build_mesh(repairs, geometry.vertices, geometry.faces, normals=normals, colors=colors, texcoords=texcoords)

@@ -3,25 +3,39 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from renderer.arguments.arrays import real_argument
+from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import lattice_faces
 
 
 def heightfield_mesh(grid: ArrayLike, spacing: ArrayLike = 1.0, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Mesh:
-    """The mesh of a grid of heights along z: a vertex for each, two faces for each cell of four, seen from above.
+    """Return the mesh of a grid of heights along z: a vertex for each, and two faces for each cell.
 
-    grid     (rows, columns), each at least 2: the height at x = column, y = row; a raster whose first row is the
-             northernmost is given as ``grid[::-1]``. NaN: nothing is known there, and the faces around it are left out
-    spacing  of columns and rows, > 0: one number, or (2,) along x and y
-    origin   (3,), to which the first row and column and height 0 go
+    Parameters
+    ----------
+    grid : array_like, shape (rows, columns)
+        The height at x = column, y = row; at least 2 x 2. Give a raster whose first row is the northernmost as
+        ``grid[::-1]``. The faces around a NaN are left out.
+    spacing : float or array_like, shape (2,), default 1
+        The distance of columns and rows, > 0; two numbers along x and y.
+    origin : array_like, shape (3,), default (0, 0, 0)
+        The place of the first row and column at height 0.
 
-    Vertex ``row * columns + column`` is the grid's; cells are cut from their least to their greatest x and y. Raises
-    ``ValueError`` naming the argument and, for an infinite height, its place, and for more vertices than a mesh holds.
+    Returns
+    -------
+    Mesh
+        Vertex ``row * columns + column`` is that of the grid. Faces are counter-clockwise seen from above.
 
+    Raises
+    ------
+    ValueError
+        For a bad argument. The message names it and, for an infinite height, its place.
+
+    Examples
+    --------
     >>> from renderer.mesh.heightfield import heightfield_mesh
     >>> mesh = heightfield_mesh([[0, 0, 0], [0, 1, 0]], spacing=2.0, origin=(100, 200, 0))
     >>> mesh.vertices[4].tolist(), len(mesh.faces)

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from renderer.errors import MeshError
+from renderer.errors import MeshError, NoSuchMeshError
 from renderer.mesh.glb import parse_glb
 from renderer.mesh.mesh import Mesh, Repairs, RepairWarning
 from renderer.mesh.obj import parse_obj
@@ -20,22 +20,41 @@ from renderer.system.files import as_path, read_whole, write_atomically
 
 
 def load_mesh(path: str | os.PathLike[str], name: str | None = None, *, repair: bool = False) -> Mesh:
-    """Read a triangle mesh from a .ply, .obj, .stl or .glb file.
+    """Return the triangle mesh in a .ply, .obj, .stl or .glb file.
 
-    name : the mesh's name; by default the file's, without its suffix.
-    repair : leave out the triangles that name a vertex that is not finite or an index out of range, keep the rest
-        as ``Mesh.repaired`` does, and issue one ``RepairWarning`` that names the file and the counts.
+    Polygons are cut into triangles. Normals, colours and texture coordinates of vertices are kept; of GLB, colours only
+    if a mesh has no material, and texture coordinates only if it has one. Groups and objects of OBJ, nodes of
+    GLB and solids of STL are ``parts`` of the mesh. An STL file shares no vertices between its faces.
 
-    Polygons are cut into triangles: by a fan from the first corner, concave ones by their ears. The fan stays, though
-    it may be wrong, where a polygon touches or crosses itself, repeats a corner, has a hole by a bridge, more than 4096
-    corners, or strays from its plane. Normals, colours and texture coordinates of vertices are kept; of GLB, colours
-    only where a mesh has no material, and texture coordinates only where it has one. Positions are float64 whatever the
-    file holds. An STL file shares no vertices between its faces.
+    Parameters
+    ----------
+    path : str or path
+    name : str, optional
+        The name of the mesh; by default that of the file, without its suffix.
+    repair : bool, default False
+        Leave out triangles that name a missing vertex or one that is not finite, as ``Mesh.repaired`` does, and issue a
+        ``RepairWarning`` that counts them.
 
-    Raises ``MeshError`` that names the file and the fault: not there, not a file, unknown suffix, malformed
-    or truncated, no faces, a face index out of range, a face of fewer than three vertices, values that are
-    not finite. With ``repair`` it is raised where no good face is left, and for faults that no repair mends.
+    Returns
+    -------
+    Mesh
 
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file. The error is a ``MeshError`` too.
+    MeshError
+        For a file that cannot be read: of another kind, malformed, truncated, without faces, with values that are not
+        finite. The message names the file and the fault.
+
+    Notes
+    -----
+    Polygons are cut by a fan from the first corner; concave ones by their ears. The fan stays, though it may be wrong,
+    if a polygon touches or crosses itself, repeats a corner, has a hole by a bridge or more than 4096 corners, or is
+    far from flat.
+
+    Examples
+    --------
     >>> from renderer import load_mesh
     >>> mesh = load_mesh("scenes/models/torus_knot.ply")
     >>> mesh.name, mesh.faces.shape, mesh.is_closed()
@@ -51,6 +70,8 @@ def load_mesh(path: str | os.PathLike[str], name: str | None = None, *, repair: 
         raise MeshError(f"{path}: expected a suffix of {', '.join(_PARSERS)}, got {path.suffix!r}")
     try:
         content = read_whole(path)
+    except FileNotFoundError as error:
+        raise NoSuchMeshError(f"{path}: cannot be read: {error.strerror}") from error
     except OSError as error:
         raise MeshError(f"{path}: cannot be read: {error.strerror or error}") from error
     try:
@@ -86,10 +107,7 @@ def _total(repairs: list[Repairs]) -> Repairs:
 
 
 def save_ply(mesh: Mesh, path: str | os.PathLike[str]) -> None:
-    """Write ``mesh`` as binary little-endian PLY, with float32 positions where those are exact, else double.
-
-    The file appears whole or not at all. Raises ``OSError`` where it cannot be written.
-    """
+    """Write ``mesh`` as binary little-endian PLY, as ``Mesh.save`` does."""
     write_atomically(path, lambda file: file.write(format_ply(mesh)))
 
 

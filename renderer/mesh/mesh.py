@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from renderer.arguments.arrays import plain_array, real_array
+from renderer.arguments.types import ArrayLike
 from renderer.errors import MeshError
 from renderer.lazy import lazy
 from renderer.mesh.edges import open_edges
+from renderer.mesh.foreign import TriangleMesh, attributes_of, has_own_normals, has_triangles
+from renderer.mesh.parts import Part, parts_of
+from renderer.mesh.values import Owner
 
 Float64Array = NDArray[np.float64]
 Int32Array = NDArray[np.int32]
@@ -23,8 +28,10 @@ MAX_VERTICES = 2**31 - 1
 
 
 class RepairWarning(UserWarning):
-    r"""A mesh file was loaded without its bad parts; names the file and counts them.
+    r"""The warning that a mesh file was loaded without its bad parts. It names the file and counts them.
 
+    Examples
+    --------
     >>> import warnings
     >>> from pathlib import Path
     >>> from tempfile import TemporaryDirectory
@@ -40,14 +47,21 @@ class RepairWarning(UserWarning):
 
 @dataclass(frozen=True, eq=False)
 class Repairs:
-    """The rows that ``Mesh.repaired`` left out or replaced; true where there are any.
+    """What ``Mesh.repaired`` left out or replaced; true where there is anything.
 
-    dropped_faces : rows of the given faces that name a vertex that is not finite or that is not there, (n,) int64.
-    bad_vertices : rows of the given vertices that are not finite, named by a face or not, (n,) int64.
-    kept_faces : the given row of each face that was kept, (F,) int64; it takes a hit's ``face`` to the given faces.
-    bad_normals : rows of the given normals that are not finite at a vertex that is, (n,) int64; the mean of the faces
-        around the vertex replaces them.
+    Attributes
+    ----------
+    dropped_faces : ndarray of int64, shape (n,)
+        Rows of the given faces that name a missing vertex or one that is not finite.
+    bad_vertices : ndarray of int64, shape (n,)
+        Rows of the given vertices that are not finite.
+    kept_faces : ndarray of int64, shape (F,)
+        The row of each kept face in the given faces. ``kept_faces[hits.face[hits.hit]]`` are faces as given.
+    bad_normals : ndarray of int64, shape (n,)
+        Rows of the given normals that are not finite at a finite vertex. The mean of the faces around replaces them.
 
+    Examples
+    --------
     >>> from renderer import Mesh
     >>> mesh, repairs = Mesh.repaired([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 9], [0, 1, 2]])
     >>> print(repairs)
@@ -70,23 +84,34 @@ class Repairs:
         return f"dropped {dropped} of {dropped + len(self.kept_faces)} faces; {bad} vertices are not finite{normals}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Mesh:
-    """Triangles over shared vertices.
+    """An immutable triangle mesh with checked arrays.
 
-    The constructor accepts anything that numpy reads as an array (lists, float32, any integer type), copies
-    it, checks it and makes it read-only; code that holds a ``Mesh`` need not check again. Meshes compare and
-    hash by identity.
+    The arrays are copied and made read-only. Meshes compare and hash by identity.
 
-    vertices : (V, 3) float64, finite, scene units.
-    faces : (F, 3) int32, each in [0, V); counter-clockwise seen from outside. F may be 0.
-    normals : (V, 3) float64 shading normals, finite, or None. They need not be of unit length.
-    colors : (V, 3) float32 RGB in [0, 1], or None.
-    texcoords : (V, 2) float64, origin at the lower left of the texture, or None.
-    name : used to begin error messages.
+    Parameters
+    ----------
+    vertices : array_like, shape (V, 3)
+        Finite positions, kept as float64.
+    faces : array_like of int, shape (F, 3)
+        Vertex numbers, counter-clockwise seen from outside, kept as int32. F may be 0.
+    normals : array_like, shape (V, 3), optional
+        Shading normals of any length, kept as float64.
+    colors : array_like, shape (V, 3), optional
+        RGB from 0 to 1, kept as float32.
+    texcoords : array_like, shape (V, 2), optional
+        Texture coordinates from the lower left, kept as float64.
+    name : str, default ""
+        Begins error messages, and names the part that the mesh becomes in ``Mesh.concatenate``.
 
-    Raises ``MeshError`` that names the array, the value that was expected, the one given and its row.
+    Raises
+    ------
+    MeshError
+        For a bad array. The message names the array, the expected value, the given one and its row.
 
+    Examples
+    --------
     >>> from renderer import Mesh
     >>> mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 2, 0]], [[0, 1, 2]])
     >>> mesh.face_normals().tolist()
@@ -101,59 +126,154 @@ class Mesh:
     colors: NDArray[np.float32] | None = None
     texcoords: Float64Array | None = None
     name: str = ""
+    # () for one part, which has the mesh's name.
+    _parts: tuple[Part, ...] = field(default=(), repr=False)
 
-    if TYPE_CHECKING:
-
-        def __init__(
-            self,
-            vertices: ArrayLike,
-            faces: ArrayLike,
-            normals: ArrayLike | None = None,
-            colors: ArrayLike | None = None,
-            texcoords: ArrayLike | None = None,
-            name: str = "",
-        ) -> None: ...
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.name, str):
-            raise MeshError(f"name: expected a string, got {type(self.name).__name__}")
-        vertices = _real_rows(self.name, "vertices", self.vertices, 3, np.float64)
-        self._expect_finite("vertices", vertices)
-        faces = self._checked_faces(len(vertices))
-        object.__setattr__(self, "vertices", _read_only(vertices))
-        object.__setattr__(self, "faces", _read_only(faces))
+    def __init__(
+        self,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        normals: ArrayLike | None = None,
+        colors: ArrayLike | None = None,
+        texcoords: ArrayLike | None = None,
+        name: str = "",
+        _parts: tuple[Part, ...] = (),
+    ) -> None:
+        if not isinstance(name, str):
+            raise MeshError(f"name: expected a string, got {type(name).__name__}")
+        object.__setattr__(self, "name", name)
+        positions = _real_rows(name, "vertices", vertices, 3, np.float64)
+        self._expect_finite("vertices", positions)
+        object.__setattr__(self, "vertices", _read_only(positions))
+        object.__setattr__(self, "faces", _read_only(self._checked_faces(faces)))
+        given = {"normals": normals, "colors": colors, "texcoords": texcoords}
         for attribute, width, dtype in _VERTEX_ATTRIBUTES:
-            values = getattr(self, attribute)
-            if values is not None:
-                object.__setattr__(self, attribute, _read_only(_real_rows(self.name, attribute, values, width, dtype)))
+            values = given[attribute]
+            rows = None if values is None else _read_only(_real_rows(name, attribute, values, width, dtype))
+            object.__setattr__(self, attribute, rows)
         self._check_attributes()
+        give_parts(self, _parts)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles are made by the constructor, which checks the arrays and makes them read-only."""
-        return Mesh, (self.vertices, self.faces, self.normals, self.colors, self.texcoords, self.name)
+        return Mesh, (self.vertices, self.faces, self.normals, self.colors, self.texcoords, self.name, self._parts)
 
     @classmethod
-    def viewing(cls, arrays: Mapping[str, NDArray[Any]], name: str) -> Mesh:
+    def _viewing(cls, arrays: Mapping[str, NDArray[Any]], name: str) -> Mesh:
         """A mesh over ``arrays`` themselves, which have its names, types and shapes: they are not copied.
 
         Values are checked as by the constructor. Nobody may write to their memory from then on.
-
-        >>> import numpy as np
-        >>> from renderer import Mesh
-        >>> arrays = {"vertices": np.eye(3), "faces": np.array([[0, 1, 2]], np.int32)}
-        >>> mesh = Mesh.viewing(arrays, "triangle")
-        >>> np.shares_memory(mesh.vertices, arrays["vertices"]), mesh.vertices.flags.writeable
-        (True, False)
         """
         mesh = object.__new__(cls)
         for attribute in ("vertices", "faces", *(attribute for attribute, _, _ in _VERTEX_ATTRIBUTES)):
             array = arrays.get(attribute)
             object.__setattr__(mesh, attribute, None if array is None else _read_only(array))
         object.__setattr__(mesh, "name", name)
+        object.__setattr__(mesh, "_parts", ())
         mesh._expect_finite("vertices", mesh.vertices)
         mesh._expect_indices(mesh.faces, len(mesh.vertices))
         mesh._check_attributes()
         return mesh
+
+    @classmethod
+    def from_trimesh(cls, mesh: TriangleMesh, name: str = "") -> Mesh:
+        """Copy a ``trimesh.Trimesh``, or any object with ``vertices`` and ``faces``.
+
+        Vertex colours and texture coordinates are copied too. Vertex normals are copied only if they differ from those
+        that trimesh computes from the faces; ``Mesh.vertex_normals`` computes these. Face colours are not copied.
+
+        Parameters
+        ----------
+        mesh : trimesh.Trimesh
+            trimesh itself is not imported.
+        name : str, default ""
+            The name of the mesh.
+
+        Returns
+        -------
+        Mesh
+
+        Raises
+        ------
+        MeshError
+            For other objects and for bad arrays.
+
+        Examples
+        --------
+        >>> import trimesh
+        >>> from renderer import Mesh
+        >>> Mesh.from_trimesh(trimesh.creation.box()).faces.shape
+        (12, 3)
+        """
+        if isinstance(mesh, Mesh):
+            return replace(mesh, name=name or mesh.name)
+        vertices, faces, attributes = foreign_arrays(mesh, name)
+        return cls(vertices, faces, name=name, **attributes)
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        values: ArrayLike | None = None,
+        cmap: str = "viridis",
+        *,
+        on: Owner | None = None,
+        limits: tuple[float, float] | None = None,
+    ) -> None:
+        """Write a binary PLY file, coloured by values if there are any.
+
+        The file appears whole or not at all. With values, each face or vertex gets a colour, and the value itself as
+        the property ``value``. Values that are not finite are grey.
+
+        Parameters
+        ----------
+        path : str or path
+            Must end in ``.ply``.
+        values : array_like, shape (F,) or (V,), optional
+            A value for each face or each vertex. Their colours replace the mesh's own in the file.
+        cmap : {"viridis", "magma", "coolwarm", "gray"}, default "viridis"
+            The colour map.
+        on : {"faces", "vertices"}, optional
+            What the values belong to. Needed only if the mesh has as many faces as vertices.
+        limits : (float, float), optional
+            The values at the two ends of the colour map; by default the least and the greatest finite value.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written.
+        ValueError
+            For a bad argument, which it names.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from renderer import load_mesh
+        >>> from renderer.mesh.shapes import box
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     box().save(f"{folder}/box.ply", values=range(12))
+        ...     load_mesh(f"{folder}/box.ply").faces.shape
+        (12, 3)
+        """
+        from renderer.mesh.save import save_mesh  # which imports this module
+
+        save_mesh(self, path, values, cmap, on, limits)
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The parts of the mesh: each has a ``name`` and a slice ``faces``, in the order of the faces.
+
+        An OBJ file has a part for each group or object, a GLB file one for each node with a mesh, a text STL file one
+        for each solid, and ``Mesh.concatenate`` makes one for each mesh. Any other mesh is one part. ``hits.part`` is
+        an index of this tuple.
+
+        Examples
+        --------
+        >>> from renderer import Mesh
+        >>> from renderer.mesh.shapes import box, icosphere
+        >>> [(part.name, part.faces) for part in Mesh.concatenate([box(), icosphere(0)]).parts]
+        [('box', slice(0, 12, None)), ('icosphere', slice(12, 32, None))]
+        """
+        return self._parts or (Part(self.name, slice(0, len(self.faces))),)
 
     def _check_attributes(self) -> None:
         """Raise ``MeshError`` for what the vertices carry and is no row a vertex, not finite, or no colour."""
@@ -180,10 +300,10 @@ class Mesh:
         if not finite.all():
             self._reject_rows(argument, floats, ~finite, "finite values")
 
-    def _checked_faces(self, vertex_count: int) -> Int32Array:
+    def _checked_faces(self, given: ArrayLike) -> Int32Array:
         # A copy, which no other thread can change once it is checked.
-        faces = np.array(_index_rows(self.name, self.faces), order="C")
-        self._expect_indices(faces, vertex_count)
+        faces = np.array(_index_rows(self.name, given), order="C")
+        self._expect_indices(faces, len(self.vertices))
         return faces.astype(np.int32, copy=False)
 
     def _expect_indices(self, faces: NDArray[Any], vertex_count: int) -> None:
@@ -196,8 +316,10 @@ class Mesh:
 
     @lazy
     def bounds(self) -> tuple[Float64Array, Float64Array]:
-        """Least and greatest corner, each (3,) float64; (inf, -inf) when there are no vertices.
+        """The least and the greatest corner, each (3,) float64; (inf, -inf) without vertices.
 
+        Examples
+        --------
         >>> from renderer.mesh.shapes import box
         >>> lower, upper = box((0, 0, 0), (1, 2, 3)).bounds
         >>> lower, upper
@@ -209,8 +331,10 @@ class Mesh:
 
     @property
     def extent(self) -> Float64Array:
-        """Size along each axis, (3,) float64; 0 when there are no vertices.
+        """The size along each axis, (3,) float64; 0 without vertices.
 
+        Examples
+        --------
         >>> from renderer.mesh.shapes import box
         >>> box((1, 1, 1), (2, 3, 4)).extent
         array([1., 2., 3.])
@@ -220,8 +344,10 @@ class Mesh:
 
     @property
     def triangles(self) -> Float64Array:
-        """Corner positions, (F, 3 corners, 3) float64, a new array.
+        """The corners of the faces, (F, 3, 3) float64, a new array.
 
+        Examples
+        --------
         >>> from renderer import Mesh
         >>> mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
         >>> mesh.triangles.tolist()
@@ -233,6 +359,8 @@ class Mesh:
     def is_float32(self) -> bool:
         """Whether float32 holds every vertex exactly.
 
+        Examples
+        --------
         >>> from renderer.mesh.shapes import box
         >>> box((0, 0, 0), (0.5, 1, 1)).is_float32, box((0, 0, 0), (0.1, 1, 1)).is_float32
         (True, False)
@@ -241,8 +369,15 @@ class Mesh:
             return bool((self.vertices.astype(np.float32) == self.vertices).all())
 
     def face_normals(self) -> Float64Array:
-        """Unit geometric normals, (F, 3) float64; zero for a face without area.
+        """Return the unit normals of the faces.
 
+        Returns
+        -------
+        ndarray of float64, shape (F, 3)
+            By the right-hand rule; zero for a face without area.
+
+        Examples
+        --------
         >>> from renderer import Mesh
         >>> mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
         >>> mesh.face_normals()
@@ -251,11 +386,21 @@ class Mesh:
         return face_normals(self.triangles)
 
     def vertex_normals(self) -> Float64Array:
-        """Unit normals, (V, 3) float64: face normals weighted by the face's angle at the vertex.
+        """Return the unit normals of the vertices: means of face normals, weighted by the face's angle at the vertex.
 
-        Unlike area weights, angles do not depend on how a flat region is cut into triangles (Thürmer and
-        Wüthrich 1998). A vertex that no face with area uses gets zero.
+        Unlike weights by area, angles do not depend on how a flat region is cut into triangles.
 
+        Returns
+        -------
+        ndarray of float64, shape (V, 3)
+            Zero for a vertex that no face with area uses.
+
+        References
+        ----------
+        Thürmer and Wüthrich, Computing Vertex Normals from Polygonal Facets, 1998.
+
+        Examples
+        --------
         >>> from renderer.mesh.shapes import box
         >>> box((-1, -1, -1), (1, 1, 1)).vertex_normals()[7].round(3)
         array([0.577, 0.577, 0.577])
@@ -276,27 +421,35 @@ class Mesh:
         return np.stack(_unit((sums[0], sums[1], sums[2])), axis=1)
 
     def is_closed(self) -> bool:
-        """Whether the faces bound a volume: each edge is used exactly twice, once in either direction.
+        """Return whether the faces bound a volume, so that ``Octree.contains`` takes the mesh.
 
-        False for a mesh without faces and where a face names a vertex twice. Vertices are told apart by
-        index, not by position.
+        The mesh has faces, and each edge is passed as often in one direction as in the other. Edges are told apart by
+        the positions of their ends, so a mesh whose faces share no vertices, as in an STL file, can be closed.
 
+        Returns
+        -------
+        bool
+
+        See Also
+        --------
+        Mesh.open_edges : The edges where it is not closed.
+
+        Examples
+        --------
         >>> from renderer.mesh.shapes import box, grid
         >>> box().is_closed(), grid().is_closed()
         (True, False)
         """
-        start, end = self.faces.ravel().astype(np.int64), np.roll(self.faces, -1, axis=1).ravel()
-        if len(start) == 0 or (start == end).any():
-            return False
-        count = len(self.vertices)
-        forward = np.sort(start * count + end)
-        backward = np.sort(end * np.int64(count) + start)
-        return bool((forward[1:] != forward[:-1]).all() and (forward == backward).all())
+        return len(self.faces) > 0 and len(self.open_edges) == 0
 
     @lazy
     def open_edges(self) -> NDArray[np.int64]:
-        """(k, 2) vertices of the edges that are not passed as often in one direction as in the other, by position.
+        """The vertices of each edge that is passed more often in one direction than in the other, (k, 2) int64.
 
+        Edges are told apart by the positions of their ends.
+
+        Examples
+        --------
         >>> from renderer import Mesh
         >>> from renderer.mesh.shapes import box
         >>> lidless = Mesh(box().vertices, box().faces[:-2])
@@ -307,8 +460,12 @@ class Mesh:
 
     @lazy
     def odd_edges(self) -> NDArray[np.int64]:
-        """(k, 2) vertices of the edges that an odd number of faces has, by position.
+        """The vertices of each edge that an odd number of faces has, (k, 2) int64.
 
+        Edges are told apart by the positions of their ends.
+
+        Examples
+        --------
         >>> from renderer import Mesh
         >>> mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
         >>> mesh.odd_edges.tolist()
@@ -318,14 +475,28 @@ class Mesh:
         """
         return open_edges(self.vertices, self.faces, oriented=False)
 
-    def transformed(self, matrix: object) -> Mesh:
-        """A copy moved by an affine map.
+    def transformed(self, matrix: ArrayLike) -> Mesh:
+        """Return a copy moved by an affine map.
 
-        matrix : (4, 4), applied to column vectors; its last row must be 0 0 0 1.
+        Normals are transformed by the inverse transpose and get unit length. If the map mirrors, each face is turned
+        round, so that outside stays outside.
 
-        Normals go by the inverse transpose and come back with unit length. A map that mirrors also turns
-        each face round, so that outside stays outside.
+        Parameters
+        ----------
+        matrix : array_like, shape (4, 4)
+            Applied to column vectors. Its last row is 0 0 0 1.
 
+        Returns
+        -------
+        Mesh
+
+        Raises
+        ------
+        MeshError
+            For any other matrix, and where float64 cannot hold the result.
+
+        Examples
+        --------
         >>> from renderer.mesh.shapes import box
         >>> moved = box().transformed([[2, 0, 0, 5], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
         >>> [corner.tolist() for corner in moved.bounds]
@@ -333,11 +504,11 @@ class Mesh:
         """
         expected = "matrix: expected a finite affine (4, 4) with last row 0 0 0 1"
         try:
-            given = np.asarray(matrix)
-        except ValueError as error:  # a ragged list
-            raise self._error(f"{expected}, got {error}") from error
-        if given.shape != (4, 4) or given.dtype.kind not in "fiu":
-            raise self._error(f"{expected}, got shape {given.shape} of dtype {given.dtype}")
+            given = real_array(matrix)
+        except ValueError as error:
+            raise self._error(f"matrix: {error}") from error
+        if given.shape != (4, 4):
+            raise self._error(f"{expected}, got shape {given.shape}")
         with np.errstate(over="ignore", invalid="ignore"):  # what float64 cannot hold is rejected just below
             affine = given.astype(np.float64)
         if not np.isfinite(affine).all() or affine[3].tolist() != [0, 0, 0, 1]:
@@ -357,36 +528,58 @@ class Mesh:
             vertices = self.vertices @ linear.T + affine[:3, 3]
         return replace(self, vertices=vertices, faces=faces, normals=normals)
 
+    @overload
     @classmethod
-    def concatenate(cls, meshes: Iterable[Mesh], name: str = "") -> Mesh:
-        """One mesh of all vertices and faces, in order.
+    def concatenate(cls, meshes: Iterable[Mesh], name: str = "") -> Mesh: ...
+    @overload
+    @classmethod
+    def concatenate(cls, meshes: Mesh, *more: Mesh, name: str = "") -> Mesh: ...
+    @classmethod
+    def concatenate(cls, meshes: Mesh | Iterable[Mesh], *more: Any, name: str = "") -> Mesh:
+        """Return one mesh of all vertices and faces, in order, with a part for each mesh.
 
-        Normals, colours and texture coordinates stay only where all the meshes have them. Raises ``MeshError``
-        where ``meshes`` holds anything else.
+        Normals, colours and texture coordinates stay only if all the meshes have them.
 
+        Parameters
+        ----------
+        meshes : iterable of Mesh, or Mesh
+            ``concatenate([a, b])`` and ``concatenate(a, b)`` are the same.
+        *more : Mesh
+            The other meshes, if the first argument is one.
+        name : str, default ""
+            The name of the new mesh.
+
+        Returns
+        -------
+        Mesh
+
+        Raises
+        ------
+        MeshError
+            For anything that is no mesh.
+
+        Examples
+        --------
         >>> from renderer import Mesh
         >>> from renderer.mesh.shapes import box
         >>> two = Mesh.concatenate([box(), box((3, 0, 0), (4, 1, 1))])
-        >>> len(two.vertices), len(two.faces), two.extent.tolist()
-        (16, 24, [4.0, 1.0, 1.0])
+        >>> len(two.vertices), len(two.faces), two.extent.tolist(), len(two.parts)
+        (16, 24, [4.0, 1.0, 1.0], 2)
         """
-        try:
-            parts = list(meshes)
-        except TypeError:  # also of what claims to be iterable and is not, as an array without dimensions
-            raise _error(name, f"meshes: expected an iterable of Mesh, got {type(meshes).__name__}") from None
-        for row, part in enumerate(parts):
-            if not isinstance(part, Mesh):
-                raise _error(name, f"meshes: expected an iterable of Mesh, got {type(part).__name__} in row {row}")
-        if not parts:
+        if not isinstance(meshes, Mesh) and len(more) == 1 and isinstance(more[0], str):
+            return cls.concatenate(meshes, name=more[0])  # concatenate([a, b], "name")
+        given = _listed(meshes, more, name)
+        if not given:
             return cls(np.empty((0, 3)), np.empty((0, 3), np.int32), name=name)
-        starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
+        starts = np.cumsum([0] + [len(part.vertices) for part in given[:-1]])
         attributes: dict[str, Any] = {}
         for attribute, _, _ in _VERTEX_ATTRIBUTES:
-            arrays = [getattr(part, attribute) for part in parts]
+            arrays = [getattr(part, attribute) for part in given]
             if all(array is not None for array in arrays):
                 attributes[attribute] = np.concatenate(arrays)
-        faces = np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=True)])
-        return cls(np.concatenate([part.vertices for part in parts]), faces, name=name, **attributes)
+        faces = np.concatenate([part.faces + start for part, start in zip(given, starts, strict=True)])
+        mesh = cls(np.concatenate([part.vertices for part in given]), faces, name=name, **attributes)
+        return give_parts(mesh, parts_of([part.name for part in given], [len(part.faces) for part in given]))
 
     @classmethod
     def repaired(
@@ -398,14 +591,29 @@ class Mesh:
         texcoords: ArrayLike | None = None,
         name: str = "",
     ) -> tuple[Mesh, Repairs]:
-        """The mesh of the good faces, in their order, and the ``Repairs``.
+        """Return the mesh of the good faces, in their order, and what was left out.
 
-        A face is dropped where it names a vertex with a NaN or infinite coordinate, or an index out of range. Such
-        a vertex stays in its row, so that indices keep their meaning, but at 0 with all its attributes. A normal that
-        is not finite becomes the mean of the faces around its vertex. Arguments as for the class. Any other fault is a
-        ``MeshError`` as there: shapes, dtypes, colours and texture coordinates that are not finite at a vertex that is.
-        Input without faults gives the same mesh as the class does.
+        A face is dropped if it names a missing vertex, or one that is not finite. Such a vertex keeps its row, so that
+        indices keep their meaning, but moves to 0 with all its attributes. A normal that is not finite becomes the mean
+        of the faces around its vertex. Input without faults gives the same mesh as ``Mesh`` does.
 
+        Parameters
+        ----------
+        vertices, faces, normals, colors, texcoords, name
+            As for ``Mesh``.
+
+        Returns
+        -------
+        mesh : Mesh
+        repairs : Repairs
+
+        Raises
+        ------
+        MeshError
+            For other faults: wrong shapes and types, colours and texture coordinates that are not finite.
+
+        Examples
+        --------
         >>> import numpy as np
         >>> from renderer import Mesh
         >>> mesh, repairs = Mesh.repaired([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, np.nan, 0]], [[0, 1, 3], [0, 1, 2]])
@@ -435,6 +643,43 @@ class Mesh:
                 given[lost] = cls(positions, indices[kept], name=name).vertex_normals()[lost]
         repairs = Repairs(*(_read_only(np.flatnonzero(rows).astype(np.int64)) for rows in (~kept, ~finite, kept, lost)))
         return cls(positions, indices[kept], name=name, **attributes), repairs
+
+
+def give_parts(mesh: Mesh, parts: tuple[Part, ...]) -> Mesh:
+    """The mesh with its parts, while it is being made; parts that do not end with its last face are of another one."""
+    fit = bool(parts) and parts[-1].faces.stop == len(mesh.faces)
+    object.__setattr__(mesh, "_parts", parts if fit else ())
+    return mesh
+
+
+def foreign_arrays(mesh: TriangleMesh, name: str = "") -> tuple[Any, Any, dict[str, Any]]:
+    """Vertices, faces and attributes of a mesh of another library; see ``Mesh.from_trimesh``."""
+    if not has_triangles(mesh):
+        hint = "; scene.to_mesh() makes one of a scene" if hasattr(mesh, "to_mesh") else ""
+        got = f"{type(mesh).__module__}.{type(mesh).__name__}{hint}"
+        raise _error(name, f"mesh: expected an object with vertices and faces, as a trimesh.Trimesh, got {got}")
+    attributes = attributes_of(mesh)
+    if attributes["normals"] is not None and not has_own_normals(mesh, attributes["normals"]):
+        attributes["normals"] = None
+    return mesh.vertices, mesh.faces, attributes
+
+
+def _listed(meshes: Any, more: tuple[Any, ...], name: str) -> list[Mesh]:
+    """The arguments of ``Mesh.concatenate`` as a list, checked."""
+    expected = "meshes: expected an iterable of Mesh, got"
+    if isinstance(meshes, Mesh):
+        given = [meshes, *more]
+    else:
+        try:
+            given = list(meshes)
+        except TypeError:  # also of what claims to be iterable and is not, as an array without dimensions
+            raise _error(name, f"{expected} {type(meshes).__name__}") from None
+        if more:
+            raise _error(name, f"{expected} {type(meshes).__name__} before {type(more[0]).__name__}")
+    for row, part in enumerate(given):
+        if not isinstance(part, Mesh):
+            raise _error(name, f"{expected} {type(part).__name__} in row {row}")
+    return given
 
 
 def face_normals(corners: Float64Array) -> Float64Array:

@@ -10,12 +10,14 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import MeshError
-from renderer.mesh.mesh import Float64Array, Mesh, Repairs, build_mesh
+from renderer.mesh.mesh import Float64Array, Mesh, Repairs, build_mesh, give_parts
+from renderer.mesh.parts import Part, runs_of
 from renderer.mesh.polygons import triangulate
 
 # Statements that say nothing about surfaces made of polygons. Free-form surfaces are refused, not dropped.
@@ -37,6 +39,14 @@ class _Content:
     # index is out of range and bad faces are to be dropped.
     corners: NDArray[np.int64]
     starts: NDArray[np.int64]  # polygon p has corners[starts[p] : starts[p + 1]]
+    groups: list[_Group]
+
+
+class _Group(NamedTuple):
+    """A statement ``g`` or ``o``: the name that it gives to the polygons from this one on."""
+
+    first: int
+    name: str
 
 
 def parse_obj(content: bytes, repairs: list[Repairs] | None = None) -> Mesh:
@@ -46,13 +56,24 @@ def parse_obj(content: bytes, repairs: list[Repairs] | None = None) -> Mesh:
     back from what stands before the face. A vertex is split where its faces differ in texture coordinate or normal.
     Where only some faces have texture coordinates, the others get (0, 0); where only some have normals, the normals
     are left out, since they follow from the faces. Vertex colours after the position are kept where every vertex has
-    them. Lines, points, groups and materials are ignored. ``repairs`` as for ``build_mesh``; faces are then dropped
-    for any index out of range.
+    them. The last ``g`` or ``o`` before a face names its part. Lines, points and materials are ignored. ``repairs`` as
+    for ``build_mesh``; faces are then dropped for any index out of range.
 
     Raises ``MeshError`` with the line's number; it does not know the file's name.
     """
     read = _read_common(content)
-    return _mesh(_read_any(content, repairs is not None) if read is None else read, repairs)
+    read = _read_any(content, repairs is not None) if read is None else read
+    mesh = _mesh(read, repairs)
+    return give_parts(mesh, _parts(read, repairs[-1].kept_faces if repairs else None))
+
+
+def _parts(content: _Content, kept: NDArray[np.int64] | None) -> tuple[Part, ...]:
+    """The parts that groups make, of the triangles that were kept."""
+    firsts = np.array([*(group.first for group in content.groups), len(content.starts) - 1], np.int64)
+    # A polygon of n corners has n - 2 triangles.
+    ends = content.starts[firsts] - 2 * firsts
+    ends = ends if kept is None else np.searchsorted(kept, ends)
+    return runs_of(["", *(group.name for group in content.groups)], ends.tolist())
 
 
 def _mesh(content: _Content, repairs: list[Repairs] | None) -> Mesh:
@@ -106,9 +127,10 @@ def _read_common(content: bytes) -> _Content | None:
     """
     if content.count(b"\r") != content.count(b"\r\n") or re.search(rb"\\(\r|\n|\Z)", content):
         return None
-    blocks = _blocks(content + b"\n")
-    if blocks is None or not blocks["v"] or not blocks["f"]:
+    found = _blocks(content + b"\n")
+    if found is None or not found[0]["v"] or not found[0]["f"]:
         return None
+    blocks, groups = found
     try:
         position = _table(blocks["v"], b"v", 3)
         texcoord = _table(blocks["vt"], b"vt", 1)
@@ -120,10 +142,10 @@ def _read_common(content: bytes) -> _Content | None:
         return None
     colors = position[:, 3:6] if position.shape[1] >= 6 else None
     texcoord = np.pad(texcoord, ((0, 0), (0, 1)))[:, :2]
-    return _Content(np.ascontiguousarray(position[:, :3]), colors, texcoord, normal[:, :3], *faces)
+    return _Content(np.ascontiguousarray(position[:, :3]), colors, texcoord, normal[:, :3], *faces, groups)
 
 
-def _blocks(content: bytes) -> dict[str, bytes] | None:
+def _blocks(content: bytes) -> tuple[dict[str, bytes], list[_Group]] | None:
     """All lines of each keyword that matters, end to end; None if any other line is not certain to be ignored."""
     letters = np.frombuffer(content, np.uint8)
     ends = np.flatnonzero(letters == ord("\n")) + 1
@@ -138,17 +160,21 @@ def _blocks(content: bytes) -> dict[str, bytes] | None:
         "f": (first == ord("f")) & blank,
     }
     rest = ~np.logical_or.reduce([*rows.values(), first == ord("#"), first == ord("\n")])
-    for start, end in zip(starts[rest].tolist(), ends[rest].tolist(), strict=True):
+    groups, before = [], np.cumsum(rows["f"])
+    for start, end, polygons in zip(starts[rest].tolist(), ends[rest].tolist(), before[rest].tolist(), strict=True):
         keyword = content[start:end].split(None, 1)[:1]
         if content[start : start + 1] != b"\r" and (not keyword or keyword[0].decode("latin-1") not in _IGNORED):
             return None
+        if keyword in ([b"g"], [b"o"]):
+            words = content[start:end].decode("utf-8", "replace").partition("#")[0].split()
+            groups.append(_Group(polygons, " ".join(words[1:])))
     blocks = {}
     for name, chosen in rows.items():
         # Runs of lines begin and end where the choice changes.
         changes = np.flatnonzero(np.diff(chosen, prepend=False, append=False))
         edges = np.append(starts, len(content))[changes].tolist()
         blocks[name] = b"".join([content[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True)])
-    return blocks
+    return blocks, groups
 
 
 def _table(block: bytes, keyword: bytes, least: int) -> Float64Array:
@@ -212,6 +238,7 @@ class _Statements:
     normals: list[list[float]] = field(default_factory=list)
     corners: list[tuple[int, int, int]] = field(default_factory=list)
     lengths: list[int] = field(default_factory=list)
+    groups: list[_Group] = field(default_factory=list)
 
 
 def _read_any(content: bytes, keeps_bad_faces: bool) -> _Content:
@@ -241,6 +268,7 @@ def _read_any(content: bytes, keeps_bad_faces: bool) -> _Content:
         np.array(statements.normals, np.float64).reshape(-1, 3),
         np.array(statements.corners, np.int64).reshape(-1, 3),
         np.cumsum([0, *statements.lengths]),
+        statements.groups,
     )
 
 
@@ -273,6 +301,8 @@ def _read_statement(keyword: str, words: list[str], statements: _Statements) -> 
                 raise ValueError("expected a face of at least 3 vertices")
             statements.corners += [_corner(word, statements) for word in words]
             statements.lengths.append(len(words))
+        case "g" | "o":
+            statements.groups.append(_Group(len(statements.lengths), " ".join(words)))
         case _ if keyword not in _IGNORED:
             raise ValueError("expected a statement of a polygon mesh")
 

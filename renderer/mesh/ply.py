@@ -102,15 +102,20 @@ def format_ply(mesh: Mesh) -> bytes:
 
     Normals and texture coordinates are doubles; colours are floats.
     """
+    return format_columns(vertex_columns(mesh), mesh.faces)
+
+
+def vertex_columns(mesh: Mesh, colors: bool = True) -> dict[str, NDArray[Any]]:
+    """The columns of a mesh's vertices: positions, and what else they have, ``colors`` only if wanted."""
     columns = by_name(("x", "y", "z"), mesh.vertices.astype(np.float32) if mesh.is_float32 else mesh.vertices)
     for names, array in (
         (("nx", "ny", "nz"), mesh.normals),
-        (("red", "green", "blue"), mesh.colors),
+        (("red", "green", "blue"), mesh.colors if colors else None),
         (("s", "t"), mesh.texcoords),
     ):
         if array is not None:
             columns |= by_name(names, array)
-    return format_columns(columns, mesh.faces)
+    return columns
 
 
 def by_name(names: tuple[str, ...], array: NDArray[Any]) -> dict[str, NDArray[Any]]:

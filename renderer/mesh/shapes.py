@@ -1,4 +1,4 @@
-"""Meshes of simple shapes: float64, outward winding, vertices shared between faces."""
+"""Meshes of simple shapes: float64, faces wound outward, vertices shared between faces."""
 
 from __future__ import annotations
 
@@ -9,9 +9,28 @@ from renderer.mesh.mesh import Float64Array, Int32Array, Mesh
 
 
 def icosphere(level: int = 3) -> Mesh:
-    """The unit sphere at the origin: an icosahedron cut ``level`` times, 20 * 4**level faces.
+    """The unit sphere at the origin, by an icosahedron whose faces are cut in four ``level`` times.
 
-    Vertices lie on the sphere to float64 rounding; ``level`` is in [0, 10].
+    Parameters
+    ----------
+    level : int, default 3
+        From 0 to 10.
+
+    Returns
+    -------
+    Mesh
+        ``20 * 4**level`` faces; vertices lie on the sphere but for rounding.
+
+    Raises
+    ------
+    ValueError
+        For another level.
+
+    Examples
+    --------
+    >>> from renderer import shapes
+    >>> shapes.icosphere(2).faces.shape
+    (320, 3)
     """
     expect(0 <= level <= 10, "level", "0 to 10", level)
     golden = (1 + np.sqrt(5)) / 2
@@ -26,10 +45,33 @@ def icosphere(level: int = 3) -> Mesh:
 
 
 def torus(major: float = 1.0, minor: float = 0.25, around: int = 64, across: int = 32) -> Mesh:
-    """A torus about the y axis at the origin: ``2 * around * across`` faces.
+    """A torus about the y axis at the origin.
 
-    major : radius of the circle of tube centres. minor : radius of the tube, in (0, major).
-    around, across : segments along the big circle and along the tube's section, each at least 3.
+    Parameters
+    ----------
+    major : float, default 1
+        The radius of the circle in the middle of the tube.
+    minor : float, default 0.25
+        The radius of the tube, less than ``major``.
+    around, across : int, default 64 and 32
+        The number of segments along the circle and around the tube, at least 3.
+
+    Returns
+    -------
+    Mesh
+        ``2 * around * across`` faces.
+
+    Raises
+    ------
+    ValueError
+        For other radii or numbers.
+
+    Examples
+    --------
+    >>> from renderer import shapes
+    >>> ring = shapes.torus(around=8, across=4)
+    >>> ring.faces.shape, ring.is_closed()
+    ((64, 3), True)
     """
     expect(0 < minor < major, "minor", f"in (0, major = {major})", minor)
     expect(around >= 3 and across >= 3, "around, across", "at least 3", (around, across))
@@ -43,17 +85,59 @@ def torus(major: float = 1.0, minor: float = 0.25, around: int = 64, across: int
 
 
 def box(lower: tuple[float, float, float] = (0, 0, 0), upper: tuple[float, float, float] = (1, 1, 1)) -> Mesh:
-    """An axis-parallel box: 8 vertices, 12 faces."""
+    """A box parallel to the axes.
+
+    Parameters
+    ----------
+    lower, upper : (float, float, float), default (0, 0, 0) and (1, 1, 1)
+        The least and the greatest corner.
+
+    Returns
+    -------
+    Mesh
+        8 vertices and 12 faces.
+
+    Raises
+    ------
+    ValueError
+        Where ``upper`` is not above ``lower``.
+
+    Examples
+    --------
+    >>> from renderer import shapes
+    >>> shapes.box(upper=(2, 1, 1)).extent
+    array([2., 1., 1.])
+    """
     expect(all(a < b for a, b in zip(lower, upper, strict=True)), "upper", f"above lower = {lower}", upper)
     corners = [[(lower, upper)[(corner >> axis) & 1][axis] for axis in range(3)] for corner in range(8)]
     return Mesh(np.array(corners, dtype=np.float64), _BOX_FACES, name="box")
 
 
 def grid(rows: int = 1, columns: int = 1, size: tuple[float, float] = (1.0, 1.0)) -> Mesh:
-    """A rectangle in the plane y = 0, centred at the origin, normal +y: ``2 * rows * columns`` faces.
+    """A rectangle in the plane y = 0, centred at the origin, whose normal is +y.
 
-    size : lengths along x and z; ``columns`` cells lie along x, ``rows`` along z. Texture coordinates run
-    from (0, 0) at least x, greatest z to (1, 1).
+    Parameters
+    ----------
+    rows, columns : int, default 1
+        The number of cells along z and along x.
+    size : (float, float), default (1, 1)
+        The lengths along x and z.
+
+    Returns
+    -------
+    Mesh
+        ``2 * rows * columns`` faces. Texture coordinates run from (0, 0) at least x and greatest z to (1, 1).
+
+    Raises
+    ------
+    ValueError
+        For fewer than one row or column.
+
+    Examples
+    --------
+    >>> from renderer import shapes
+    >>> shapes.grid(2, 3).faces.shape
+    (12, 3)
     """
     expect(rows >= 1 and columns >= 1, "rows, columns", "at least 1", (rows, columns))
     s, t = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1))

@@ -1,7 +1,7 @@
-"""Numbers of twice float64's digits: a pair (head, tail) stands for the sum of two float64, the tail a rounding of it.
+"""Double-double numbers: a pair (head, tail) is the sum of two float64; the tail is at most a rounding of the head.
 
 Sums and products of float64 are exact as pairs; those of pairs err by less than 2^-100 of their terms. No product may
-overflow or vanish: scale by ``power_below`` first. Sources: Dekker, A Floating-Point Technique for Extending the
+overflow or underflow: scale by ``power_below`` first. Sources: Dekker, A Floating-Point Technique for Extending the
 Available Precision, Numerische Mathematik 18, 1971; Shewchuk, Adaptive Precision Floating-Point Arithmetic, 1997.
 """
 
@@ -17,7 +17,7 @@ _EXPONENT = 0x7FF0000000000000
 
 @inlined
 def power_below(x):
-    """The largest power of two that a positive normal float64 is not less than."""
+    """The largest power of two not above a positive normal float64."""
     return np.int64(np.float64(x).view(np.int64) & _EXPONENT).view(np.float64)
 
 
@@ -37,7 +37,7 @@ def exact_sum(a, b):
 
 @inlined
 def _halves(a):
-    """Two float64 of 26 digits each whose sum is a."""
+    """Two float64 of 26 digits each with the sum a."""
     c = _SPLITTER * a
     high = c - (c - a)
     return high, a - high
@@ -88,7 +88,7 @@ def dot_pairs(a, b):
 
 @kernel
 def cross_pairs(a, b):
-    """Vector product of two vectors of pairs."""
+    """Cross product of two vectors of pairs."""
     return (
         minus(product(a[1], b[2]), product(a[2], b[1])),
         minus(product(a[2], b[0]), product(a[0], b[2])),
@@ -122,7 +122,7 @@ def length_pair(a):
 
 @kernel
 def negative(a):
-    """A vector of pairs the other way."""
+    """The negative of a vector of pairs."""
     return (-a[0][0], -a[0][1]), (-a[1][0], -a[1][1]), (-a[2][0], -a[2][1])
 
 
@@ -134,5 +134,5 @@ def heads(a):
 
 @kernel
 def as_pairs(a):
-    """A vector of float64 as one of pairs."""
+    """A vector of float64 as a vector of pairs."""
     return (a[0], 0.0), (a[1], 0.0), (a[2], 0.0)

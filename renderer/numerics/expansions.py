@@ -1,8 +1,8 @@
-"""Determinants of differences of float64 as expansions: sums that are exact, so that their signs and digits are true.
+"""Determinants of differences of float64 as expansions: exact sums, with exact signs and digits.
 
-A determinant of differences is a sum of products. Each difference is exact as a pair, each product of float64 is exact
-as a pair, and a sum of float64 is exact as an expansion: parts that do not overlap, whose largest has the sum's sign.
-Source: Shewchuk, Adaptive Precision Floating-Point Arithmetic, Discrete and Computational Geometry 18, 1997.
+A determinant of differences is a sum of products. Differences and products of float64 are exact as pairs. A sum of
+float64 is exact as an expansion: parts that do not overlap, of which the largest has the sign of the sum. Source:
+Shewchuk, Adaptive Precision Floating-Point Arithmetic, Discrete and Computational Geometry 18, 1997.
 """
 
 from renderer.jit.decorators import kernel
@@ -20,7 +20,7 @@ _SMALLEST_AREA, _SMALLEST_VOLUME, _LARGEST = 2.0**-960, 2.0**-900, 2.0**960
 
 @kernel
 def expand_area(a, b, p, parts):
-    """(a - p) x (b - p) of points (x, y) into ``parts``; returns the number of parts, or OUT_OF_RANGE."""
+    """(a - p) x (b - p) of points (x, y) into ``parts``. Returns the number of parts, or OUT_OF_RANGE."""
     ax, ay, bx, by = difference(a[0], p[0]), difference(a[1], p[1]), difference(b[0], p[0]), difference(b[1], p[1])
     if _least(ax, bx) * _least(ay, by) <= _SMALLEST_AREA or _most(ax, bx) * _most(ay, by) >= _LARGEST:
         return OUT_OF_RANGE
@@ -30,7 +30,7 @@ def expand_area(a, b, p, parts):
 
 @kernel
 def expand_volume(a, b, c, p, parts):
-    """(a - p) . ((b - p) x (c - p)) of points (x, y, z), as of ``expand_area``."""
+    """(a - p) . ((b - p) x (c - p)) of points (x, y, z), like ``expand_area``."""
     return _expand_triple(_differences(a, p), _differences(b, p), _differences(c, p), parts)
 
 
@@ -54,7 +54,7 @@ def _expand_triple(a, b, c, parts):
 
 @kernel
 def expand_slope(a, b, c, d, parts):
-    """((b - a) x (c - a)) . d of points and a direction (x, y, z), as of ``expand_area``."""
+    """((b - a) x (c - a)) . d of points and a direction (x, y, z), like ``expand_area``."""
     return _expand_triple(_differences(b, a), _differences(c, a), ((d[0], 0.0), (d[1], 0.0), (d[2], 0.0)), parts)
 
 
@@ -83,7 +83,7 @@ def pair_of(parts, count):
 
 @kernel
 def _least(a, b):
-    """The least part of two pairs, without signs and zeros; 1 at most."""
+    """The least nonzero part of two pairs, without signs; at most 1."""
     least = 1.0
     for x in (a[0], a[1], b[0], b[1]):
         least = minimum(least, abs(x)) if x != 0.0 else least
@@ -92,13 +92,13 @@ def _least(a, b):
 
 @kernel
 def _most(a, b):
-    """The largest part of two pairs, without signs; 1 at least."""
+    """The largest part of two pairs, without signs; at least 1."""
     return maximum(maximum(abs(a[0]), abs(b[0])), 1.0)
 
 
 @kernel
 def _add_area(parts, count, a, b, sign):
-    """Add a product of two pairs to an expansion; returns the number of its parts, as all below do."""
+    """Add a product of two pairs to an expansion. Returns the number of its parts, as do all functions below."""
     for x in a:
         for y in b:
             if x != 0.0 and y != 0.0:
@@ -127,7 +127,7 @@ def _add_pair(parts, count, pair):
 
 @kernel
 def _add(parts, count, x):
-    """Add a number to an expansion, whose parts rise; parts that are 0 are left out."""
+    """Add a number to an expansion, whose parts are in rising order; zero parts are left out."""
     kept = 0
     for i in range(count):
         x, rest = exact_sum(x, load(parts, i))

@@ -1,4 +1,4 @@
-"""Exact signs of areas and volumes: on which side of a line or plane a point lies, and whether on a face."""
+"""Exact signs of areas and volumes: the side of a line or plane of a point, and whether it lies on a face."""
 
 import numpy as np
 
@@ -25,19 +25,19 @@ def area_sign(a, b, p, parts):
 
 @kernel
 def volume_sign(a, b, c, p, parts):
-    """The sign of (a - p) . ((b - p) x (c - p)), as of ``area_sign``."""
+    """The sign of (a - p) . ((b - p) x (c - p)), like ``area_sign``."""
     return _sign_in_range(expand_volume, a, b, c, p, parts)
 
 
 @kernel
 def slope_sign(a, b, c, d, parts):
-    """The sign of ((b - a) x (c - a)) . d, as of ``area_sign``."""
+    """The sign of ((b - a) x (c - a)) . d, like ``area_sign``."""
     return _sign_in_range(expand_slope, a, b, c, d, parts)
 
 
 @inlined
 def _sign_in_range(expand, a, b, c, d, parts):
-    """The sign of what ``expand`` makes of four points, stretched where its products are out of range."""
+    """The sign of the expansion ``expand`` of four points, which are stretched if products are out of range."""
     count = expand(a, b, c, d, parts)
     if count == OUT_OF_RANGE:
         s = balance(a[0], b[0], c[0], d[0]), balance(a[1], b[1], c[1], d[1]), balance(a[2], b[2], c[2], d[2])
@@ -47,8 +47,8 @@ def _sign_in_range(expand, a, b, c, d, parts):
 
 @kernel
 def balance(a, b, c, d):
-    """The power of two by which an axis is stretched, which turns no sign, so that its least and largest coordinates
-    are as far from 1: beside one of 1e-310 products with one of 1 are in range then.
+    """The power of two by which to stretch an axis so that its least and largest coordinates are equally far from 1. It
+    changes no sign, and brings products such as 1e-310 times 1 into range.
     """
     least, most = np.inf, 0.0
     for x in (abs(a), abs(b), abs(c), abs(d)):
@@ -64,7 +64,7 @@ def stretched(a, s):
 
 @inlined
 def differ(s0, s1, s2):
-    """Whether signs contradict each other, 0 none."""
+    """Whether signs contradict each other; 0 contradicts none."""
     return (s0 > 0 or s1 > 0 or s2 > 0) and (s0 < 0 or s1 < 0 or s2 < 0)
 
 
@@ -72,8 +72,8 @@ def differ(s0, s1, s2):
 def lies_within(a, b, c, p, parts):
     """Whether a point in the plane of a face lies on the face, or UNDECIDED.
 
-    Along each axis it is seen within the face's outline. A face that is seen as a line each time is one, and then all
-    coordinates tell.
+    Seen along each axis, the point must lie within the face's outline. A face that looks like a line along every axis
+    is one; then coordinates alone decide.
     """
     informed = False
     for _ in range(3):

@@ -1,4 +1,4 @@
-"""Vectors of rational numbers, for the few points whose products float64 cannot hold."""
+"""Vectors of rational numbers, for the few points whose products float64 cannot represent."""
 
 from fractions import Fraction
 from typing import Any
@@ -17,7 +17,7 @@ def exact(point: NDArray[np.float64]) -> Vector:
 
 
 def corners_from(point: NDArray[np.float64], triangle: NDArray[np.float64]) -> tuple[Vector, Vector, Vector]:
-    """The corners of a triangle (3 corners, 3) less a point (3,)."""
+    """The corners of a triangle (3 corners, 3) minus a point (3,)."""
     p = exact(point)
     a, b, c = (less(exact(corner), p) for corner in triangle)
     return a, b, c
@@ -39,5 +39,5 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 
 def volume(a: Vector, b: Vector, c: Vector) -> Any:
-    """The triple product a . (b x c): 0 where the origin lies in the plane of the corners."""
+    """The triple product a . (b x c): 0 if the origin lies in the plane of the corners."""
     return dot(a, cross(b, c))

@@ -1,10 +1,9 @@
 """Short vectors as values in Numba kernels: 8 x float32, 4 x float64 and their masks.
 
-This is the one file that touches llvmlite. A vector lives in a register; it is made by ``load*`` or ``splat*`` and
-leaves through ``store``, ``extract`` or ``movemask``. ``+ - * /`` and the comparisons work lane by lane. A comparison
-gives a mask that is unset where either value is NaN, for ``!=`` too; masks have ``&`` and ``|``. No operation carries
-fast-math flags, so nothing becomes a fused multiply-add: the signs of the edge functions in ``intersect`` depend on
-that.
+Only this file uses llvmlite. A vector lives in a register: ``load*`` or ``splat*`` create it, ``store``, ``extract`` or
+``movemask`` read it. ``+ - * /`` and comparisons work lane by lane. A comparison, also ``!=``, gives a mask that is
+unset for NaN; masks have ``&`` and ``|``. No operation has fast-math flags, so nothing becomes a fused multiply-add;
+the signs of the edge functions in ``intersect`` depend on that.
 """
 
 import operator
@@ -49,7 +48,7 @@ class _VectorModel(models.PrimitiveModel):
 
 
 def _numbers(args: Any) -> Any:
-    """The vector that two operands have in common: equal float vectors, or one and a number for all lanes."""
+    """The common vector type of two operands: equal float vectors, or one and a number for all lanes."""
     for vector in args:
         if isinstance(vector, Vector) and vector.scalar in _NUMBER:
             fits = all(other in (vector, _NUMBER[vector.scalar]) for other in map(types.unliteral, args))
@@ -58,7 +57,7 @@ def _numbers(args: Any) -> Any:
 
 
 def _spread(builder: Any, vector: Vector, value: Any) -> Any:
-    """A vector as it is; a number in all lanes."""
+    """A vector unchanged; a number in all lanes."""
     if isinstance(value.type, ir.VectorType):
         return value
     one = builder.insert_element(ir.Constant(_llvm(vector), ir.Undefined), value, ir.IntType(32)(0))
@@ -67,7 +66,7 @@ def _spread(builder: Any, vector: Vector, value: Any) -> Any:
 
 
 def _operator(op: Any, answer: Any, emit: Any) -> None:
-    """Give ``op`` a meaning for float vectors, and for one and a number; ``answer`` is the type of its result."""
+    """Define ``op`` for float vectors, and for a vector and a number; ``answer`` is the type of its result."""
 
     @infer_global(op)
     class _Typing(AbstractTemplate):
@@ -146,7 +145,7 @@ def address(typingctx, array):
 
 
 def _pointer_to(dtype: Any) -> Any:
-    """The function that makes an address, an int64, a ``pointer`` to values of ``dtype``."""
+    """The function that converts an address, an int64, to a ``pointer`` to values of ``dtype``."""
 
     @intrinsic
     def pointer_to(typingctx, address):
@@ -166,7 +165,7 @@ bool_pointer = _pointer_to(types.boolean)
 
 
 def _extreme(a: Any, b: Any, predicate: str) -> Any:
-    """The second of two values where ``predicate`` puts it before the first, else the first."""
+    """The second of two values if ``predicate`` puts it before the first, else the first."""
     vector = _numbers((a, b))
     number = types.unliteral(a)
 
@@ -181,22 +180,22 @@ def _extreme(a: Any, b: Any, predicate: str) -> Any:
 
 @intrinsic
 def maximum(typingctx, a, b):
-    """``max(a, b)`` of two numbers of one type, or of float vectors; a where either is NaN."""
+    """``max(a, b)`` of two numbers of one type, or of float vectors; a if either is NaN."""
     return _extreme(a, b, ">")
 
 
 @intrinsic
 def minimum(typingctx, a, b):
-    """``min(a, b)`` of two numbers of one type, or of float vectors; a where either is NaN."""
+    """``min(a, b)`` of two numbers of one type, or of float vectors; a if either is NaN."""
     return _extreme(a, b, "<")
 
 
-# Words of ``local_words``: what a frame may take without asking the system, which on Windows is less than 4,096 bytes.
+# Words of ``local_words``: a frame of less than 4,096 bytes needs no stack probe on Windows.
 LOCAL_WORDS = 500
 
 
 def _local(number: Any, element: ir.Type) -> Any:
-    """The intrinsic's answer for LOCAL_WORDS numbers in the kernel's own frame."""
+    """The intrinsic's result: LOCAL_WORDS numbers in the kernel's own frame."""
 
     def codegen(context, builder, sig, args):
         words = cgutils.alloca_once(builder, ir.ArrayType(element, LOCAL_WORDS))
@@ -213,13 +212,13 @@ def local_words(typingctx):
 
 @intrinsic
 def local_doubles(typingctx):
-    """A ``pointer`` to LOCAL_WORDS float64, as ``local_words``."""
+    """A ``pointer`` to LOCAL_WORDS float64, like ``local_words``."""
     return _local(types.float64, ir.DoubleType())
 
 
 @intrinsic
 def double_of(typingctx, bits):
-    """The float64 whose bits are those of an int64."""
+    """The float64 with the bits of an int64."""
 
     def codegen(context, builder, sig, args):
         return builder.bitcast(args[0], ir.DoubleType())
@@ -239,7 +238,7 @@ def load(typingctx, base, index):
 
 @intrinsic
 def offset(typingctx, base, index):
-    """A ``pointer`` to the element at ``index`` of another."""
+    """A ``pointer`` to the element at ``index`` of another ``pointer``."""
 
     def codegen(context, builder, sig, args):
         return builder.gep(args[0], [args[1]])
@@ -249,7 +248,7 @@ def offset(typingctx, base, index):
 
 @intrinsic
 def prefetch(typingctx, base, index):
-    """Ask for the cache line that holds the element at ``index`` of a ``pointer``; any index is allowed."""
+    """Prefetch the cache line of the element at ``index`` of a ``pointer``; any index is allowed."""
 
     def codegen(context, builder, sig, args):
         byte, word = ir.IntType(8).as_pointer(), ir.IntType(32)
@@ -299,7 +298,7 @@ def load4(typingctx, array, index):
 
 @intrinsic
 def gather8(typingctx, base, rows, step, column):
-    """Eight float64, ``base[row * step + column]`` of the eight numbers of rows at ``rows``."""
+    """Eight float64, ``base[row * step + column]`` for the eight row numbers at ``rows``."""
 
     def codegen(context, builder, sig, args):
         base, rows, step, column = args
@@ -315,7 +314,7 @@ def gather8(typingctx, base, rows, step, column):
 
 @intrinsic
 def load_strided8(typingctx, base, first, step):
-    """Eight float64 of a ``pointer``, each ``step`` after the one before."""
+    """Eight float64 of a ``pointer``, each ``step`` after the previous one."""
 
     def codegen(context, builder, sig, args):
         base, index, step = args
@@ -348,7 +347,7 @@ def widen(typingctx, number):
 
 @intrinsic
 def is_negative(typingctx, number):
-    """Whether the sign bit of a float64 is set, or that of each of eight."""
+    """Whether the sign bit of a float64, or of each of eight, is set."""
 
     def codegen(context, builder, sig, args):
         word = ir.VectorType(ir.IntType(64), 8) if isinstance(number, Vector) else ir.IntType(64)
@@ -359,7 +358,7 @@ def is_negative(typingctx, number):
 
 @intrinsic
 def broadcast_like(typingctx, number, other):
-    """A number, or where ``other`` is a vector of eight, eight of it."""
+    """A number; or, if ``other`` is a vector of eight, eight copies of it."""
     number = types.unliteral(number)
     kind = _lanes_of(MASK8, number) if isinstance(other, Vector) else number
 
@@ -371,7 +370,7 @@ def broadcast_like(typingctx, number, other):
 
 @intrinsic
 def store(typingctx, array, index, vector):
-    """Write a vector's lanes to ``array[index:index + lanes]``, or a number to one place; the types must agree."""
+    """Write a vector's lanes to ``array[index:index + lanes]``, or a number to one place; types must be equal."""
     if not isinstance(vector, Vector):
         return types.void(array, types.intp, array.dtype), _put
 
@@ -400,7 +399,7 @@ def splat4(typingctx, value):
 
 
 def _lanes_of(mask: Any, number: Any) -> Any:
-    """The type that a number or vector has beside a mask, which may be a bool."""
+    """The type of a number or vector used with a mask, which may be a bool."""
     number = types.unliteral(number)
     if not isinstance(mask, Vector) or isinstance(number, Vector):
         return number
@@ -409,7 +408,7 @@ def _lanes_of(mask: Any, number: Any) -> Any:
 
 @intrinsic
 def select(typingctx, mask, chosen, other):
-    """Lane by lane: ``chosen`` where the mask is set, else ``other``; numbers stand for all lanes. No branch."""
+    """Lane by lane, ``chosen`` where the mask is set, else ``other``; numbers are used for all lanes. No branch."""
     kind = _lanes_of(mask, chosen)
 
     def codegen(context, builder, sig, args):
@@ -420,7 +419,7 @@ def select(typingctx, mask, chosen, other):
 
 
 def _call(builder: Any, name: str, vector: Vector, value: Any) -> Any:
-    """Call one of LLVM's own functions of a vector or number."""
+    """Call one of LLVM's intrinsics on a vector or number."""
     suffix = f"v{vector.lanes}{vector.scalar}" if isinstance(vector, Vector) else f"f{vector.bitwidth}"
     kind, name = value.type, f"llvm.{name}.{suffix}"
     return builder.call(cgutils.get_or_insert_function(builder.module, ir.FunctionType(kind, [kind]), name), [value])
@@ -438,7 +437,7 @@ def fabs(typingctx, vector):
 
 @intrinsic
 def square_root(typingctx, vector):
-    """Square roots, lane by lane, rounded as IEEE 754 has it; NaN of what is below 0."""
+    """Square roots, lane by lane, rounded by IEEE 754; NaN below 0."""
 
     def codegen(context, builder, sig, args):
         return _call(builder, "sqrt", sig.args[0], args[0])
@@ -462,7 +461,7 @@ def _lane(vector: Vector) -> Any:
 
 
 def _fold(predicate: str) -> Any:
-    """The one lane of a vector without NaN that ``predicate`` puts before all others."""
+    """The lane of a vector without NaN that ``predicate`` puts before all others."""
 
     def codegen(context, builder, sig, args):
         vector, lanes = args[0], sig.args[0].lanes
@@ -479,13 +478,13 @@ def _fold(predicate: str) -> Any:
 
 @intrinsic
 def reduce_min(typingctx, vector):
-    """The smallest lane, where none is NaN."""
+    """The smallest lane of a vector without NaN."""
     return _lane(vector)(vector), _fold("<")
 
 
 @intrinsic
 def reduce_max(typingctx, vector):
-    """The largest lane, where none is NaN."""
+    """The largest lane of a vector without NaN."""
     return _lane(vector)(vector), _fold(">")
 
 
@@ -502,7 +501,7 @@ def movemask(typingctx, mask):
 
 @intrinsic
 def unlikely(typingctx, condition):
-    """The condition, which is false nearly always: what is done where it is true takes no register from the rest."""
+    """The condition, with a hint that it is nearly always false: keeps registers for the common path."""
 
     def codegen(context, builder, sig, args):
         bit = ir.IntType(1)
@@ -534,7 +533,7 @@ def count_bits(typingctx, bits):
 
 @intrinsic
 def float_bits(typingctx, value):
-    """The bits of a float32 as a non-negative int64; for values >= 0 they sort as the values do."""
+    """The bits of a float32 as a non-negative int64; for values >= 0 they sort like the values."""
 
     def codegen(context, builder, sig, args):
         return builder.zext(builder.bitcast(args[0], ir.IntType(32)), ir.IntType(64))
@@ -544,7 +543,7 @@ def float_bits(typingctx, value):
 
 @intrinsic
 def bits_float(typingctx, bits):
-    """The float32 whose bits are the low half of an int64."""
+    """The float32 with the bits in the low half of an int64."""
 
     def codegen(context, builder, sig, args):
         return builder.bitcast(builder.trunc(args[0], ir.IntType(32)), ir.FloatType())
@@ -559,7 +558,7 @@ _NETWORK = ((1, 2), (2, 4), (1, 4), (4, 8), (2, 8), (1, 8))
 
 
 def _permuted(builder: Any, vector: Any, places: Any) -> Any:
-    """The lanes of eight that a vector of eight numbers from 0 to 7 names. LLVM makes one instruction of it in AVX2."""
+    """The lanes of eight named by a vector of eight numbers from 0 to 7. LLVM makes one AVX2 instruction of it."""
     found = ir.Constant(vector.type, ir.Undefined)
     for lane in map(ir.IntType(32), range(8)):
         value = builder.extract_element(vector, builder.extract_element(places, lane))
@@ -573,11 +572,11 @@ def _permuted(builder: Any, vector: Any, places: Any) -> Any:
 
 @intrinsic
 def farthest_first(typingctx, mask, distances, links, index):
-    """Eight int64 in falling order: a distance that the mask sets, float32 and not negative, above its int32 of those
-    that the ``pointer`` links has from ``index`` on. What the mask does not set comes last, with any values.
+    """Eight int64 in falling order: the bits of a float32 distance, not negative, above the int32 in its place from
+    ``index`` on of the ``pointer`` ``links``. Lanes outside the mask come last, with any values.
 
-    The last three bits of a distance are lost, downwards: while they are sorted the lane's number takes their place. So
-    no two are equal, and words of 32 bits are all that is compared: AVX2 has minima and maxima of these, not of 64.
+    The last three bits of a distance are cleared; during the sort they have the lane's number. So no two are equal, and
+    only 32-bit words are compared: AVX2 has minima and maxima of these, not of 64-bit words.
     """
 
     def codegen(context, builder, sig, args):

@@ -1,4 +1,4 @@
-"""Arithmetic on 3-vectors held as tuples of float64, for kernels."""
+"""3-vectors as tuples of float64, for kernels."""
 
 import math
 
@@ -8,13 +8,13 @@ from renderer.numerics.simd import load, maximum, store
 
 @kernel
 def dot(a, b):
-    """Scalar product."""
+    """Dot product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @kernel
 def cross(a, b):
-    """Vector product."""
+    """Cross product."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
@@ -43,13 +43,13 @@ def _product(x, y):
 
 @kernel
 def times(a, b):
-    """Component by component, as weights multiply colours: none is negative, and 0 times infinite light is 0."""
+    """Product by components, for weights and colours: no factor is negative, and 0 times infinite light is 0."""
     return (_product(a[0], b[0]), _product(a[1], b[1]), _product(a[2], b[2]))
 
 
 @inlined
 def largest_component(a):
-    """The largest of three numbers without their signs."""
+    """The largest absolute value of three numbers."""
     return maximum(abs(a[0]), maximum(abs(a[1]), abs(a[2])))
 
 
@@ -65,7 +65,7 @@ _SMALL, _RAISE = 2.0**-1000, 2.0**100
 
 @kernel
 def unit_and_length(a):
-    """a / |a| and |a|, scaled first so that no square overflows or vanishes; the zero vector stays."""
+    """a / |a| and |a|, scaled first so that no square overflows or underflows; the zero vector is unchanged."""
     largest, raised = largest_component(a), 1.0
     if largest == 0.0:
         return a, 0.0
@@ -78,7 +78,7 @@ def unit_and_length(a):
 
 @kernel
 def normalized(a):
-    """a / |a|; the zero vector stays."""
+    """a / |a|; the zero vector is unchanged."""
     return unit_and_length(a)[0]
 
 

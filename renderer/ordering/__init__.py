@@ -1,1 +1,1 @@
-"""Orders of points in which neighbours follow each other."""
+"""Spatial orders of points: neighbours follow each other."""

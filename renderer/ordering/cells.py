@@ -1,4 +1,4 @@
-"""The order in which points are searched: those that are near each other together, as they read the same nodes.
+"""The order of points in a search: near points together, because they read the same nodes.
 
 A grid of cells over the mesh, and a counting sort by cell. Results do not depend on the order.
 """
@@ -29,8 +29,8 @@ def search_in_order(
 ) -> None:
     """Call ``search(rows, some)`` on threads until all points (n, 3) are done: ``some`` are the points in these rows.
 
-    Each time it yields, Ctrl-C is heard. The points come in the order of a grid's cells, of a grid across the axis
-    ``along`` if that is given; the fewest at a time are ``least``. A few stay as they are.
+    Ctrl-C is handled each time it yields. Points come in the order of a grid's cells, of a grid across the axis
+    ``along`` if that is given, at least ``least`` at a time. A few points keep their order.
     """
     if len(points) <= _FEW:
         for _ in search(np.arange(len(points)), points):
@@ -49,7 +49,7 @@ def search_in_order(
 
 
 def _make_grid(lower: NDArray[np.float64], upper: NDArray[np.float64], along: int | None) -> NDArray[np.float64]:
-    """A grid (3, 3) over a box: for each axis its start, its cells a unit, and the number of its cells.
+    """A grid (3, 3) over a box: for each axis its start, its cells for each unit of length, and their number.
 
     It has 16 cells along each axis, or 64 along two and one along the axis ``along``.
     """
@@ -67,7 +67,7 @@ def _make_grid(lower: NDArray[np.float64], upper: NDArray[np.float64], along: in
 def _order_points(points, grid, rows, some, starts, begin, end):
     """Write the rows begin:end of ``points`` (n, 3), in the order of their cells, to ``rows``; the points to ``some``.
 
-    Copied, so that no search waits for its point to come from memory. ``starts`` is memory for _CELLS + 1 int64.
+    Points are copied, so that no search waits for memory. ``starts`` is memory for _CELLS + 1 int64.
     """
     for k in range(_CELLS + 1):
         starts[k] = 0

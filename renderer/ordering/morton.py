@@ -1,4 +1,4 @@
-"""The order of points along a curve that fills space: those that follow each other are near each other."""
+"""The order of points along a space-filling curve: points that follow each other are near each other."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _BITS = 21
 
 
 def order_along_curve(points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The rows of finite points (n, 3) in the order of Morton's curve over their bounds, and the steps to each of them.
+    """The rows of finite points (n, 3) in the order of Morton's curve over their bounds, and the steps between them.
 
-    Both are (n,) int64. A step is the exclusive or of two keys, 0 for the first row: the larger, the larger is the cell
-    that the curve leaves there.
+    Both are (n,) int64. A step is the exclusive or of two keys, 0 for the first row. The larger it is, the larger the
+    cell that the curve leaves there.
 
     Points of one cell, of 2^63 in the bounds, stay in the order of their rows.
     """
@@ -35,7 +35,7 @@ def order_along_curve(points: NDArray[np.float64]) -> tuple[NDArray[np.int64], N
 
 @kernel
 def _write_keys(points, grid, keys):
-    """Write the key of each point: the bits of its cell's coordinates in turn, those of z highest."""
+    """Write the key of each point: the bits of its cell's coordinates interleaved, z highest."""
     last = 2.0**_BITS - 1.0
     for i in range(len(keys)):
         key = np.int64(0)
@@ -48,7 +48,7 @@ def _write_keys(points, grid, keys):
 
 @inlined
 def _spread(bits):
-    """The 21 bits of a number, two zeros before each."""
+    """The 21 bits of a number, with two zeros before each."""
     bits = (bits | bits << 32) & 0x001F00000000FFFF
     bits = (bits | bits << 16) & 0x001F0000FF0000FF
     bits = (bits | bits << 8) & 0x100F00F00F00F00F

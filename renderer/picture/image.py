@@ -1,6 +1,9 @@
-"""A rendered picture: linear radiance with its AOVs, tone mapping, and files."""
+"""A rendered picture: linear radiance, depths, normals and faces; sRGB, and files."""
+
+from __future__ import annotations
 
 import io
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -8,9 +11,10 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from renderer.arguments.arrays import real_argument
+from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.picture.encoding import write_pixels
 from renderer.picture.exr import check_exr, exr_bytes
@@ -23,10 +27,24 @@ _ROWS = 64
 
 
 def srgb(linear: ArrayLike) -> NDArray[np.uint8]:
-    """Linear radiance, clipped to [0, 1], as 8-bit sRGB (IEC 61966-2-1).
+    """8-bit sRGB codes (IEC 61966-2-1) of linear radiance, which is clipped to [0, 1].
 
-    Raises ``ValueError`` where it is no array of real numbers.
+    Parameters
+    ----------
+    linear : array_like
+        Real numbers in any shape.
 
+    Returns
+    -------
+    ndarray of the same shape, uint8
+
+    Raises
+    ------
+    ValueError
+        For anything else than real numbers.
+
+    Examples
+    --------
     >>> from renderer import srgb
     >>> srgb([0.0, 0.2, 0.5, 1.0, 7.0])
     array([  0, 124, 188, 255, 255], dtype=uint8)
@@ -76,8 +94,10 @@ def _table() -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
 
 
 class CutWarning(UserWarning):
-    """A picture has pixels that miss rays because of ``max_rays``; the message says how many.
+    """The warning that pixels miss rays because of ``max_rays``; the message says how many.
 
+    Examples
+    --------
     >>> import warnings
     >>> from renderer import PerspectiveCamera, Phong, Scene, SceneObject, render
     >>> from renderer.mesh.shapes import icosphere
@@ -94,20 +114,33 @@ class CutWarning(UserWarning):
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """A picture of height h and width w; row 0 is the top.
+    """A picture. Row 0 is the top. ``render`` makes it, and notebooks show it.
 
-    radiance  (h, w, 3) float32, linear
-    depth     (h, w) float64, distance from the camera ray's origin; inf where nothing was hit
-    normal    (h, w, 3) float32, unit shading normal of the surface; 0 where nothing was hit
-    face      (h, w) int32, face of the merged mesh; -1 where nothing was hit
-    rays      (h, w) int32, rays traced for the pixel, shadow rays included
+    Attributes
+    ----------
+    radiance : ndarray, shape (height, width, 3), float32
+        Linear radiance, the mean of the samples of a pixel.
+    depth : ndarray, shape (height, width), float64
+        The distance from the origin of the camera ray; inf for a miss.
+    normal : ndarray, shape (height, width, 3), float32
+        The unit shading normal; 0 for a miss.
+    face : ndarray, shape (height, width), int32
+        The face, numbered through all meshes of the scene; -1 for a miss.
+    rays : ndarray, shape (height, width), int32
+        The number of rays that were traced for the pixel, with shadow rays.
+    build_seconds, render_seconds : float
+        The time to prepare the scene and to render, without compilation.
+    cut : int
+        The number of pixels that miss rays because of ``max_rays``, 0 in most pictures.
 
-    Of those that ``render`` was not asked to keep, h and w are 0. Radiance is the mean of a pixel's samples; depth,
-    normal and face are those of the ray through its centre, whatever their number. Where no sample is there, as with 4
-    or 16, ``rays`` does not count that ray.
-    cut       the number of pixels that miss rays because of ``max_rays``, 0 in most pictures
-    build_seconds, render_seconds  the time that it took, without compiling; the first is the prepared scene's
+    Notes
+    -----
+    Depth, normal and face are those of the ray through the centre of the pixel. Where no sample lies there, as with 4
+    or 16 samples, ``rays`` does not count this ray. Arrays that the argument ``planes`` of ``render`` leaves out have
+    height and width 0.
 
+    Examples
+    --------
     >>> from renderer import PerspectiveCamera, Phong, Scene, SceneObject, render
     >>> from renderer.mesh.shapes import icosphere
     >>> ball = SceneObject(mesh=icosphere(3), material="grey", normals="smooth")
@@ -128,8 +161,10 @@ class Image:
     cut: int = 0
 
     def cut_message(self, max_rays: int) -> str:
-        """The message of ``CutWarning``.
+        """The message of ``CutWarning`` for this picture.
 
+        Examples
+        --------
         >>> from renderer import PerspectiveCamera, Scene, render
         >>> eye = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
         >>> sky = render(Scene(camera=eye, materials={}, background=(0.2, 0.4, 1)), resolution=(2, 2))
@@ -137,16 +172,29 @@ class Image:
         '0 of 4 pixels miss rays:'
         """
         return (
-            f"{self.cut:,} of {self.radiance.size // 3:,} pixels miss rays: they took max_rays = {max_rays:,} a "
-            "sample. More max_rays trace all; a min_weight, such as 0.001, ends those that hardly show"
+            f"{self.cut:,} of {self.radiance.size // 3:,} pixels miss rays: a sample reached max_rays = {max_rays:,}. "
+            "Raise max_rays to trace all rays, or set min_weight, such as 0.001, to end those that hardly show"
         )
 
-    def save(self, path: str | Path) -> None:
-        """Write ``.png`` (8-bit sRGB), ``.exr`` or ``.npy`` (the linear radiance, float32), whole or not at all.
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the picture to a file, whole or not at all.
 
-        An EXR file also has the depth as Z and the normal as normal.X, normal.Y and normal.Z, float32. It needs the
-        package OpenEXR.
+        Parameters
+        ----------
+        path : path
+            The suffix is the format. ``.png``: 8-bit sRGB. ``.npy``: linear radiance, float32. ``.exr``, which needs
+            the package OpenEXR: linear radiance, the depth as Z and the normal as normal.X, normal.Y and normal.Z, all
+            float32.
 
+        Raises
+        ------
+        ValueError
+            For another suffix, a folder that is not there, or NaN in a PNG.
+        OSError
+            Where the file cannot be written.
+
+        Examples
+        --------
         >>> from tempfile import TemporaryDirectory
         >>> import numpy as np
         >>> from renderer import PerspectiveCamera, Scene, render
@@ -175,8 +223,10 @@ class Image:
 
     @property
     def srgb(self) -> NDArray[np.uint8]:
-        """The picture as (h, w, 3) uint8 sRGB, as a PNG file holds it.
+        """The picture in 8-bit sRGB, as in a PNG file: ndarray, shape (height, width, 3), uint8.
 
+        Examples
+        --------
         >>> from renderer import PerspectiveCamera, Scene, render
         >>> eye = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
         >>> sky = render(Scene(camera=eye, materials={}, background=(0.2, 0.4, 1)), resolution=(2, 2))
@@ -201,7 +251,7 @@ class Image:
         write_pixels(file, self.srgb)
 
 
-def check_picture_path(path: str | Path) -> None:
+def check_picture_path(path: str | os.PathLike[str]) -> None:
     """Raise ``ValueError`` or ``OSError`` unless ``save`` can write there; to be called before a long render."""
     path = as_path("path", path)
     expect(path.suffix.lower() in (".png", ".exr", ".npy"), "output", "a .png, .exr or .npy file", repr(str(path)))
@@ -219,7 +269,9 @@ def write_array(file: BinaryIO, values: NDArray[Any]) -> None:
     file.write(values.data)
 
 
-def write_exr(path: str | Path, radiance: ArrayLike, layers: Mapping[str, NDArray[np.float32]] | None = None) -> None:
+def write_exr(
+    path: str | os.PathLike[str], radiance: ArrayLike, layers: Mapping[str, NDArray[np.float32]] | None = None
+) -> None:
     """Write linear ``radiance`` (h, w, 3) as R, G and B, and further ``layers`` (h, w), as float32 without loss.
 
     Whole or not at all. Raises ``ValueError`` where the package OpenEXR is absent.

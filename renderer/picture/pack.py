@@ -6,6 +6,8 @@ from numpy.typing import NDArray
 from renderer.inside.rational import crossings_of, winding_of
 from renderer.mesh.mesh import Mesh
 from renderer.scene.camera import Camera
+from renderer.scene.light import light_row
+from renderer.scene.material import kind_of, material_row
 from renderer.scene.needs import Features, lit_materials, needs_of
 from renderer.scene.scene import Scene
 from renderer.shade.records import KIND, LAMBERT, LIGHT_COLUMNS, MATERIAL_COLUMNS, PHONG, UNLIT
@@ -54,8 +56,8 @@ def repacked(arrays: SceneArrays, scene: Scene, needs: Features) -> SceneArrays:
 
 def _materials(scene: Scene, needs: Features) -> NDArray[np.float64]:
     """The rows of the materials, of kinds that have all that ``needs`` names, whether the scene needs it or not."""
-    rows = np.array([m.row() for m in scene.materials.values()]).reshape(-1, MATERIAL_COLUMNS)
-    kinds, lit = rows[:, KIND], {material.kind for material in lit_materials(scene)}
+    rows = np.array([material_row(m) for m in scene.materials.values()]).reshape(-1, MATERIAL_COLUMNS)
+    kinds, lit = rows[:, KIND], {kind_of(material) for material in lit_materials(scene)}
     if needs.shadows and lit <= {UNLIT}:
         kinds[kinds == UNLIT] = LAMBERT
     if needs.specular and PHONG not in lit:
@@ -67,7 +69,7 @@ def light_rows(scene: Scene, needs: Features) -> NDArray[np.float64]:
     """The rows of the lights that shine, and of as many others as ``needs`` asks for, in the scene's order."""
     if not needs.shadows:
         return np.zeros((0, LIGHT_COLUMNS))
-    rows = np.array([light.row() for light in scene.lights]).reshape(-1, LIGHT_COLUMNS)
+    rows = np.array([light_row(light) for light in scene.lights]).reshape(-1, LIGHT_COLUMNS)
     dark = ~rows[:, 4:].any(axis=1)
     extra = np.cumsum(dark) <= needs.lights - np.count_nonzero(~dark)
     return rows[~dark | (dark & extra)]

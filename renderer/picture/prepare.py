@@ -38,14 +38,23 @@ TILE = 32
 
 @dataclass(frozen=True, eq=False)
 class PreparedScene:
-    """The data that the pictures of a scene share; make one with ``prepare`` and render it with ``render``.
+    """A scene with all that its pictures share. ``prepare`` makes it, ``render`` renders it.
 
-    scene          the scene that it was made of
-    mesh           all instances' triangles, in their order
-    octree         the tree over ``mesh``, or its ``BruteForce``
-    needs          the features that are ready: at least those of ``needs_of(scene)``
-    build_seconds  the time that it took, without compiling
+    Attributes
+    ----------
+    scene : Scene
+        The scene that it is made of.
+    mesh : Mesh
+        The triangles of all meshes of the scene, in their order.
+    octree : Octree or BruteForce
+        The tree over ``mesh``; ``BruteForce`` where there are few faces.
+    needs : Needs
+        The features that are ready, at least those of ``needs_of(scene)``.
+    build_seconds : float
+        The time that it took, without compilation.
 
+    Examples
+    --------
     >>> from renderer import PerspectiveCamera, Phong, Scene, SceneObject, prepare
     >>> from renderer.mesh.shapes import icosphere
     >>> ball = SceneObject(mesh=icosphere(3), material="grey", normals="smooth")
@@ -69,8 +78,10 @@ class PreparedScene:
 
     @lazy
     def touching(self) -> NDArray[np.uint8]:
-        """``SceneArrays.touching`` for any materials.
+        """A mark for each face that coincides with another, for any materials: ndarray, uint8.
 
+        Examples
+        --------
         >>> from renderer import PerspectiveCamera, Phong, Scene, SceneObject, prepare
         >>> from renderer.mesh.shapes import box
         >>> cube, eye = SceneObject(mesh=box(), material="grey"), PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
@@ -140,7 +151,7 @@ def prepare_scene(
 
 
 def _bundles_in_a_row(tree: Tree) -> int:
-    """The number of bundles that a kernel traces per call: some 10 ms, so that Ctrl-C need not wait for longer."""
+    """The number of bundles per call of the kernel: some 10 ms, so that Ctrl-C takes effect soon."""
     return 256 if tree.has_nodes else max(1, rays_against_blocks(tree) // SIZE)
 
 
@@ -174,7 +185,7 @@ def tree_for(octree: Octree | BruteForce, needs: Features) -> Tree:
 
 
 def _widened(tree: Tree) -> Tree:
-    """The tree with its vertices in float64, whether they need it or not."""
+    """The tree with its vertices in float64."""
     blocks = cache_aligned(len(tree.blocks), np.float64)
     blocks[:] = tree.blocks
     return replace(tree, blocks=blocks)
@@ -204,7 +215,7 @@ def arrays_for(prepared: PreparedScene, camera: Camera, offset: OffsetRule, medi
 
 
 def media_limit(needs: Features, media: MediaRule) -> int:
-    """The most media that a ray remembers. One that remembers none is inside where it looks along the normal."""
+    """The most media in a ray's stack. With none, a ray along the normal is inside."""
     return MAX_MEDIA if needs.refraction and media == "stack" else 0
 
 

@@ -1,16 +1,16 @@
 """``render`` and ``prepare``: a scene and settings in, checked, and a picture out."""
 
 import warnings
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from numbers import Real
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, Unpack
 
 from renderer.errors import expect
 from renderer.picture.image import PLANES, CutWarning, Image
 from renderer.picture.prepare import MediaRule, PreparedScene, prepare_scene, tiles
 from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
 from renderer.scene.needs import Features, checked_needs
-from renderer.scene.scene import RenderSettings, Scene, checked_settings
+from renderer.scene.scene import GivenSettings, RenderSettings, Scene, checked_settings
 from renderer.system.terminal import progress_bar
 from renderer.system.threads import checked_threads
 from renderer.trace.spawn import BOUNDED, MITSUBA_EPSILON, OffsetRule
@@ -29,37 +29,69 @@ def render(
     planes: Collection[str] = PLANES,
     threads: int | None = None,
     progress: bool = False,
-    **settings: Any,
+    **settings: Unpack[GivenSettings],
 ) -> Image:
-    """Render ``scene``; ``resolution``, ``samples``, ``max_depth``, ``min_weight``, ``max_rays`` and ``shadows``
-    override the scene's own, see ``RenderSettings``.
+    """Render a picture of a scene.
 
-    scene        a ``Scene``, or what ``prepare`` returned for one: its pictures then share the tree and all else that
-                 does not depend on the camera or these settings
-    camera       another camera than the scene's
-    accelerator  "octree", "brute" to test every ray against every face, or "auto": the octree unless the faces are so
-                 few that it does not pay. This and the next two are for a ``Scene`` that is not prepared
-    split        the rule that cuts the octree, "midpoint" or "sah"
-    needs        the features to have ready: at least those of ``needs_of``, which None stands for. More of them change
-                 no bit of radiance, depth, normal or face, and cost time and memory
-    offset       the rule by which spawned rays leave a surface: "bounded" by their rounding error, or Mitsuba's with
-                 its epsilon ("mitsuba") or with the one given
-    media        the rule for the media on both sides of glass. "stack": a ray remembers the bodies that it is in, the
-                 innermost holds, and faces that coincide are crossed together. "normal": the body is behind each of
-                 its faces and air in front, as in Mitsuba. They differ where glass is open, overlaps or touches
-    planes       the arrays of the ``Image`` to keep, of "depth", "normal", "face" and "rays": 28 of 40 bytes per pixel;
-                 "radiance" is always kept
-    threads      None takes all processors
-    progress     a bar on standard error when that is a terminal
+    Parameters
+    ----------
+    scene : Scene or PreparedScene
+        The scene. What ``prepare`` returns for one saves its preparation: the tree, and all else that does not depend
+        on the camera or the settings.
+    camera : PerspectiveCamera or OrthographicCamera, optional
+        Another camera than the scene's.
+    accelerator : {"auto", "octree", "brute"}, default "auto"
+        The octree, or a test of every ray against every face. "auto" takes the octree unless there are very few faces.
+        This argument, ``split`` and ``needs`` are for a ``Scene`` that is not prepared.
+    split : {"midpoint", "sah"}, default "midpoint"
+        The rule by which cells of the octree are cut.
+    needs : Needs, optional
+        The features to prepare: at least those of ``needs_of(scene)``, which is the default. More of them cost time
+        and memory and change no bit of radiance, depth, normal or face.
+    offset : {"bounded", "mitsuba"} or float, default "bounded"
+        How far spawned rays start from a surface: by the bound of the rounding error, or by the rule of Mitsuba, with
+        its own epsilon or the one given, below 0.1.
+    media : {"stack", "normal"}, default "stack"
+        Which media lie on both sides of glass. "stack": a ray keeps a list of the bodies that it is in, the innermost
+        counts, and faces that coincide are crossed together. "normal": the body is behind each of its faces and air is
+        in front, as in Mitsuba. They differ where glass is open, overlaps or touches.
+    planes : collection of str, default all
+        The arrays of the ``Image`` to keep beside ``radiance``, of "depth", "normal", "face" and "rays". They take 28
+        of 40 bytes a pixel.
+    threads : int, optional
+        The number of threads, by default that of the processors.
+    progress : bool, default False
+        Whether to show a progress bar on standard error, if that is a terminal.
+    **settings
+        Settings in place of those of the scene: ``resolution``, ``samples``, ``max_depth``, ``min_weight``,
+        ``max_rays`` and ``shadows``; see ``RenderSettings``.
 
-    The same bits for any number of threads. Raises ``ValueError`` naming the argument. Warns with ``CutWarning``
-    of pixels that ``max_rays`` cut. Ctrl-C stops it at once.
+    Returns
+    -------
+    Image
+        The same bits for any number of threads.
 
+    Raises
+    ------
+    ValueError
+        For a bad argument, which the message names.
+
+    Warns
+    -----
+    CutWarning
+        Where pixels miss rays because of ``max_rays``.
+
+    Notes
+    -----
+    Ctrl-C stops it at once.
+
+    Examples
+    --------
     >>> from renderer import Mesh, PerspectiveCamera, Phong, Scene, SceneObject, render
     >>> triangle = SceneObject(mesh=Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), material="grey")
     >>> camera = PerspectiveCamera(eye=(0.3, 0.3, 2), target=(0.3, 0.3, 0))
     >>> scene = Scene(camera=camera, materials={"grey": Phong()}, objects=[triangle], ambient=1)
-    >>> render(scene, resolution=(3, 3)).face[1].tolist()
+    >>> render(scene, resolution=3).face[1].tolist()
     [-1, 0, -1]
     """
     threads = checked_threads(threads)
@@ -86,17 +118,33 @@ def prepare(
     needs: Features | None = None,
     threads: int | None = None,
 ) -> PreparedScene:
-    """Compute once what all pictures of ``scene`` share, its tree above all: for animations and several cameras.
+    """Prepare a scene once for many pictures, such as those of an animation or of several cameras.
 
-    Arguments as of ``render``. The result renders at any ``max_depth``. Its pictures have the same bits as those of the
-    scene itself. Raises ``ValueError`` naming the argument.
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    accelerator, split, needs, threads
+        As of ``render``.
 
+    Returns
+    -------
+    PreparedScene
+        It renders at any ``max_depth``. Its pictures have the same bits as those of the scene itself.
+
+    Raises
+    ------
+    ValueError
+        For a bad argument, which the message names.
+
+    Examples
+    --------
     >>> from renderer import Mesh, PerspectiveCamera, Phong, Scene, SceneObject, prepare, render
     >>> triangle = SceneObject(mesh=Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), material="grey")
     >>> camera = PerspectiveCamera(eye=(0.3, 0.3, 2), target=(0.3, 0.3, 0))
     >>> ready = prepare(Scene(camera=camera, materials={"grey": Phong()}, objects=[triangle]))
     >>> beside = PerspectiveCamera(eye=(9, 0, 2), target=(9, 0, 0))
-    >>> [int(render(ready, camera=eye, resolution=(1, 1)).face[0, 0]) for eye in (camera, beside)]
+    >>> [int(render(ready, camera=eye, resolution=1).face[0, 0]) for eye in (camera, beside)]
     [0, -1]
     """
     expect(isinstance(scene, Scene), "scene", "a Scene", type(scene).__name__)
@@ -106,9 +154,7 @@ def prepare(
 
 
 class View(NamedTuple):
-    """The view that a picture shows of its scene: a camera, settings, the rules of offsets and media, and the planes
-    that are kept, all checked.
-    """
+    """A checked view: camera, settings, the rules of offsets and media, and the planes to keep."""
 
     camera: Camera
     chosen: RenderSettings
@@ -122,10 +168,10 @@ def checked_view(
     camera: Camera | None,
     offset: str | float,
     planes: Collection[str],
-    settings: dict[str, Any],
+    settings: Mapping[str, Any],
     media: MediaRule = "stack",
 ) -> View:
-    """The view that ``render`` is asked for. Raises ``ValueError`` naming the argument."""
+    """The checked view of the arguments of ``render``. Raises ``ValueError`` naming the argument."""
     eye = source.camera if camera is None else camera
     expect(isinstance(eye, PerspectiveCamera | OrthographicCamera), "camera", "a camera", type(camera).__name__)
     chosen = checked_settings(source.render, settings)
@@ -160,7 +206,7 @@ def _prepared(
 
 
 def _expect_usual(accelerator: object, split: object, needs: object) -> None:
-    """Refuse what a prepared scene cannot change any more."""
+    """Refuse arguments that a prepared scene cannot change."""
     for name, value, usual in (("accelerator", accelerator, "auto"), ("split", split, "midpoint")):
         expect(isinstance(value, str) and value == usual, name, f"{usual!r}, as the scene is prepared", repr(value))
     expect(needs is None, "needs", "None, as the scene is prepared", repr(needs))

@@ -1,25 +1,36 @@
 """The points of a mesh that are nearest to given points."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from renderer.mesh.mesh import Mesh
+from renderer.mesh.parts import part_numbers
+from renderer.mesh.values import Owner, interpolated
 from renderer.results.hits import points_on
 
 
 @dataclass(eq=False, slots=True)
 class ClosestPoints:
-    """The point of a mesh that is nearest to each of some points; shapes are the leading dimensions of those.
+    """The nearest point of a mesh to each of some points. The shape (...) is that of the points.
 
-    distance  (...) float64; inf where none is within max_distance
-    face      (...) int64; -1 there
-    u, v      (...) float64, P = (1 - u - v) p0 + u p1 + v p2; nan there
+    Attributes
+    ----------
+    distance : ndarray of float64, shape (...)
+        inf if nothing is within ``max_distance``.
+    face : ndarray of int64, shape (...)
+        The face that has the nearest point; -1 if there is none.
+    u, v : ndarray of float64, shape (...)
+        Barycentrics: the point is (1 - u - v) p0 + u p1 + v p2; nan if there is none.
 
+    Examples
+    --------
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box
-    >>> near = Octree.from_mesh(box()).closest_point([[0.5, 0.25, 3], [5, 5, 5]], max_distance=4)
+    >>> near = Octree(box()).closest_point([[0.5, 0.25, 3], [5, 5, 5]], max_distance=4)
     >>> near.distance, near.face, near.u
     (array([ 2., inf]), array([10, -1]), array([0.25,  nan]))
     """
@@ -32,27 +43,65 @@ class ClosestPoints:
 
     @property
     def found(self) -> NDArray[np.bool_]:
-        """Whether a point of the mesh is within max_distance, (...) bool.
+        """Whether a point of the mesh is within ``max_distance``, (...) bool.
 
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
-        >>> near = Octree.from_mesh(box()).closest_point([[0.5, 0.25, 3], [5, 5, 5]], max_distance=4)
-        >>> near.found
+        >>> Octree(box()).closest_point([[0.5, 0.25, 3], [5, 5, 5]], max_distance=4).found
         array([ True, False])
         """
         return self.face >= 0
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """The nearest points from the barycentrics, (..., 3) float64; nan where there is none.
+        """The nearest points, from the barycentrics, (..., 3) float64; nan if there is none.
 
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
-        >>> near = Octree.from_mesh(box()).closest_point([[0.5, 0.25, 3], [5, 5, 5]], max_distance=4)
-        >>> near.points
+        >>> Octree(box()).closest_point([[0.5, 0.25, 3], [5, 5, 5]], max_distance=4).points
         array([[0.5 , 0.25, 1.  ],
                [ nan,  nan,  nan]])
         """
         points, found = np.full((*self.face.shape, 3), np.nan), self.found
         points[found] = points_on(self._mesh, self.face[found], self.u[found], self.v[found])
         return points
+
+    @property
+    def part(self) -> NDArray[np.int64]:
+        """The part that has the nearest point, as an index of ``octree.mesh.parts``, (...) int64; -1 if there is none.
+
+        Examples
+        --------
+        >>> from renderer import Mesh, Octree
+        >>> from renderer.mesh.shapes import box
+        >>> octree = Octree(Mesh.concatenate(box(), box((3, 0, 0), (4, 1, 1))))
+        >>> octree.closest_point([[0.5, 0.25, 3], [5, 0.5, 0.5]]).part
+        array([0, 1])
+        """
+        return part_numbers(self._mesh.parts, self.face)
+
+    def interpolate(self, values: ArrayLike, *, on: Owner | None = None) -> NDArray[np.float64]:
+        """Return values of the mesh at the nearest points, as ``Hits.interpolate`` does; nan if there is none.
+
+        Parameters
+        ----------
+        values, on
+            As for ``Hits.interpolate``.
+
+        Returns
+        -------
+        ndarray of float64, shape (..., ...)
+
+        Examples
+        --------
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> octree = Octree(box())
+        >>> octree.closest_point([0.5, 0.25, 3]).interpolate(octree.mesh.vertices)
+        array([0.5 , 0.25, 1.  ])
+        """
+        return interpolated(self._mesh, self.face, self.u, self.v, values, on)

@@ -1,21 +1,31 @@
 """The answers of queries: closest hits, a row per ray, and all hits, in compressed rows."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from renderer.mesh.mesh import Mesh, face_normals
+from renderer.mesh.parts import part_numbers
+from renderer.mesh.values import Owner, interpolated
 
 
 class Passage(NamedTuple):
     """Where rays have gone through faces: ``Hits.through`` makes it, ``leaving`` takes it.
 
-    face  (...) int64
-    u, v  (...) float64, the place on the face
-    side  (...) int64, the side that the rays are on now; None where it is not known
-    pile  (...) int64, the face at which they came upon those that coincide there
+    Attributes
+    ----------
+    face : ndarray of int64, shape (...)
+        The faces.
+    u, v : ndarray of float64, shape (...)
+        The place on the face.
+    side : ndarray of int64, shape (...), or None
+        The side that the rays are on now; None if it is unknown.
+    pile : ndarray of int64, shape (...)
+        The first of the coinciding faces that the ray came upon.
     """
 
     face: NDArray[np.int64]
@@ -28,20 +38,26 @@ class Passage(NamedTuple):
 # Slots and not frozen: a call with one ray spends a third of its time on making objects.
 @dataclass(eq=False, slots=True)
 class Hits:
-    """Closest hits; their dimensions are those of the rays.
+    """Closest hits. Their shape (...) is that of the rays.
 
-    t     (...) float64, in units of |direction|; inf on a miss
-    face  (...) int64; -1 on a miss
-    u, v  (...) float64, P = (1 - u - v) p0 + u p1 + v p2; nan on a miss
+    Attributes
+    ----------
+    t : ndarray of float64, shape (...)
+        Distance in units of ``|direction|``; inf on a miss.
+    face : ndarray of int64, shape (...)
+        The face that was hit; -1 on a miss. Select by ``hit`` before you index with it.
+    u, v : ndarray of float64, shape (...)
+        Barycentrics: the point is (1 - u - v) p0 + u p1 + v p2; nan on a miss.
+    side : ndarray of int64, shape (...), or None
+        The side of the face that the ray came from: 1 that of its normal, -1 the other; 0 on a miss.
+    t_error : ndarray of float64, shape (...), or None
+        How far rounding may have moved t; nan on a miss. None without ``t_error=True``.
 
-    side  (...) int64, the side of the face that the ray came from: 1 that of its normal by winding, -1 the other one; 0
-          on a miss; None for hits that no query made
-
-    t_error  (...) float64, how far rounding may have moved t, nan on a miss; None unless it was asked for
-
+    Examples
+    --------
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box
-    >>> hits = Octree.from_mesh(box()).closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
+    >>> hits = Octree(box()).closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1])
     >>> hits.t, hits.face, hits.u
     (array([ 2., inf]), array([10, -1]), array([0.25,  nan]))
     """
@@ -55,14 +71,20 @@ class Hits:
     side: NDArray[np.int64] | None = None
     _pile: NDArray[np.int64] | None = field(default=None, repr=False)
 
-    def through(self) -> "Passage":
-        """The same places, for rays that go on through the faces: ``leaving=hits.through()``.
+    def through(self) -> Passage:
+        """Return the same places for rays that go on through the faces: ``leaving=hits.through()``.
 
         A ray with ``leaving=hits`` starts on the side that the hit ray came from, as a reflected one does.
 
+        Returns
+        -------
+        Passage
+
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
-        >>> octree, down = Octree.from_mesh(box()), [[0.0, 0.0, -1.0]]
+        >>> octree, down = Octree(box()), [[0.0, 0.0, -1.0]]
         >>> hits = octree.closest_hit([[0.5, 0.25, 3.0]], down)
         >>> octree.closest_hit(hits.points, down, leaving=hits.through()).t
         array([1.])
@@ -70,12 +92,22 @@ class Hits:
         pile = self.face if self._pile is None else self._pile
         return Passage(self.face, self.u, self.v, None if self.side is None else -self.side, pile)
 
-    def shaped(self, shape: tuple[int, ...]) -> "Hits":
-        """The same hits in other dimensions.
+    def shaped(self, shape: tuple[int, ...]) -> Hits:
+        """Return the same hits in another shape.
 
+        Parameters
+        ----------
+        shape : tuple of int
+
+        Returns
+        -------
+        Hits
+
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
-        >>> hits = Octree.from_mesh(box()).closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
+        >>> hits = Octree(box()).closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1])
         >>> hits.shaped((2, 1)).t.tolist()
         [[2.0], [inf]]
         """
@@ -92,22 +124,24 @@ class Hits:
     def hit(self) -> NDArray[np.bool_]:
         """Whether each ray hit a face, (...) bool.
 
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
-        >>> hits = Octree.from_mesh(box()).closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
-        >>> hits.hit
+        >>> Octree(box()).closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1]).hit
         array([ True, False])
         """
         return self.face >= 0
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """Hit points from the barycentrics, (..., 3) float64; nan on a miss.
+        """The hit points, from the barycentrics, (..., 3) float64; nan on a miss.
 
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
-        >>> hits = Octree.from_mesh(box()).closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
-        >>> hits.points
+        >>> Octree(box()).closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1]).points
         array([[0.5 , 0.25, 1.  ],
                [ nan,  nan,  nan]])
         """
@@ -118,12 +152,13 @@ class Hits:
 
     @property
     def normals(self) -> NDArray[np.float64]:
-        """Unit geometric normals by the faces' winding, (..., 3) float64; nan on a miss.
+        """The unit normals of the faces that were hit, by the right-hand rule, (..., 3) float64; nan on a miss.
 
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
-        >>> hits = Octree.from_mesh(box()).closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
-        >>> hits.normals
+        >>> Octree(box()).closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1]).normals
         array([[ 0.,  0.,  1.],
                [nan, nan, nan]])
         """
@@ -132,23 +167,80 @@ class Hits:
         normals[hit] = _normals(self._mesh, self.face[hit])
         return normals
 
+    @property
+    def part(self) -> NDArray[np.int64]:
+        """The part that each ray hit, as an index of ``octree.mesh.parts``, (...) int64; -1 on a miss.
+
+        Examples
+        --------
+        >>> from renderer import Mesh, Octree
+        >>> from renderer.mesh.shapes import box
+        >>> octree = Octree(Mesh.concatenate(box(), box((3, 0, 0), (4, 1, 1))))
+        >>> octree.closest_hit([[0.5, 0.25, 3], [3.5, 0.25, 3], [5, 5, 5]], [0, 0, -1]).part
+        array([ 0,  1, -1])
+        """
+        return part_numbers(self._mesh.parts, self.face)
+
+    def interpolate(self, values: ArrayLike, *, on: Owner | None = None) -> NDArray[np.float64]:
+        """Return values of the mesh at the hits: interpolated between vertices, or those of the faces.
+
+        Parameters
+        ----------
+        values : array_like, shape (V, ...) or (F, ...)
+            A number or a row of numbers for each vertex or each face of the mesh, such as ``mesh.colors``.
+        on : {"vertices", "faces"}, optional
+            What the values belong to. Needed only if the mesh has as many vertices as faces.
+
+        Returns
+        -------
+        ndarray of float64, shape (..., ...)
+            The shape of the hits, then that of a row; nan on a miss.
+
+        Raises
+        ------
+        ValueError
+            If the number of rows is neither that of the vertices nor that of the faces.
+
+        Examples
+        --------
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> octree = Octree(box())
+        >>> hits = octree.closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1])
+        >>> hits.interpolate(octree.mesh.vertices[:, 0])
+        array([0.5, nan])
+        >>> hits.interpolate(range(12))
+        array([10., nan])
+        """
+        return interpolated(self._mesh, self.face, self.u, self.v, values, on)
+
 
 @dataclass(eq=False, slots=True)
 class AllHits:
     """All hits of n rays, m in all, in compressed rows: those of ray i are the rows offsets[i] to offsets[i + 1].
 
-    The rows of a ray are sorted by t, then face.
+    The hits of a ray are sorted by t, then by face.
 
-    offsets  (n + 1,) int64, from 0 to m
-    t        (m,) float64, in units of |direction|
-    face     (m,) int64
-    u, v     (m,) float64, P = (1 - u - v) p0 + u p1 + v p2
-    t_error  (m,) float64, how far rounding may have moved t; None unless it was asked for
-    side     (m,) int64, the side of the face that the ray came from, as of ``Hits``
+    Attributes
+    ----------
+    offsets : ndarray of int64, shape (n + 1,)
+        Where the hits of each ray begin; from 0 to m.
+    t : ndarray of float64, shape (m,)
+        Distance in units of ``|direction|``.
+    face : ndarray of int64, shape (m,)
+        The face that was hit.
+    u, v : ndarray of float64, shape (m,)
+        Barycentrics: the point is (1 - u - v) p0 + u p1 + v p2.
+    t_error : ndarray of float64, shape (m,), or None
+        How far rounding may have moved t. None without ``t_error=True``.
+    side : ndarray of int64, shape (m,)
+        The side of the face that the ray came from, as in ``Hits``.
 
+    Examples
+    --------
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box
-    >>> hits = Octree.from_mesh(box()).all_hits([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
+    >>> hits = Octree(box()).all_hits([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1])
     >>> begin, end = hits.offsets[:2]
     >>> hits.t[begin:end], hits.face[begin:end]
     (array([2., 3.]), array([10,  9]))
@@ -166,36 +258,39 @@ class AllHits:
 
     @property
     def counts(self) -> NDArray[np.int64]:
-        """The number of hits of each ray, in the dimensions of the rays, (...) int64.
+        """The number of hits of each ray, in the shape of the rays, (...) int64.
 
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
-        >>> hits = Octree.from_mesh(box()).all_hits([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
-        >>> hits.counts
+        >>> Octree(box()).all_hits([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1]).counts
         array([2, 0])
         """
         return np.diff(self.offsets).reshape(self._shape)
 
     @property
     def ray(self) -> NDArray[np.int64]:
-        """The ray of each hit, (m,) int64: its row, where rays of several dimensions are counted in C order.
+        """The ray of each hit, (m,) int64. Rays of several dimensions are counted in C order.
 
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
-        >>> hits = Octree.from_mesh(box()).all_hits([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
-        >>> hits.ray
+        >>> Octree(box()).all_hits([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1]).ray
         array([0, 0])
         """
         return np.repeat(np.arange(len(self.offsets) - 1), np.diff(self.offsets))
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """Hit points from the barycentrics, (m, 3) float64.
+        """The hit points, from the barycentrics, (m, 3) float64.
 
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
-        >>> hits = Octree.from_mesh(box()).all_hits([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
-        >>> hits.points
+        >>> Octree(box()).all_hits([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1]).points
         array([[0.5 , 0.25, 1.  ],
                [0.5 , 0.25, 0.  ]])
         """
@@ -203,16 +298,53 @@ class AllHits:
 
     @property
     def normals(self) -> NDArray[np.float64]:
-        """Unit geometric normals by the faces' winding, (m, 3) float64.
+        """The unit normals of the faces that were hit, by the right-hand rule, (m, 3) float64.
 
+        Examples
+        --------
         >>> from renderer import Octree
         >>> from renderer.mesh.shapes import box
-        >>> hits = Octree.from_mesh(box()).all_hits([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
-        >>> hits.normals
+        >>> Octree(box()).all_hits([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1]).normals
         array([[ 0.,  0.,  1.],
                [ 0.,  0., -1.]])
         """
         return _normals(self._mesh, self.face)
+
+    @property
+    def part(self) -> NDArray[np.int64]:
+        """The part of each hit, as an index of ``octree.mesh.parts``, (m,) int64.
+
+        Examples
+        --------
+        >>> from renderer import Mesh, Octree
+        >>> from renderer.mesh.shapes import box
+        >>> octree = Octree(Mesh.concatenate(box(), box((0, 0, 2), (1, 1, 3))))
+        >>> octree.all_hits([0.5, 0.25, 5], [0, 0, -1]).part
+        array([1, 1, 0, 0])
+        """
+        return part_numbers(self._mesh.parts, self.face)
+
+    def interpolate(self, values: ArrayLike, *, on: Owner | None = None) -> NDArray[np.float64]:
+        """Return values of the mesh at the hits, as ``Hits.interpolate`` does.
+
+        Parameters
+        ----------
+        values, on
+            As for ``Hits.interpolate``.
+
+        Returns
+        -------
+        ndarray of float64, shape (m, ...)
+
+        Examples
+        --------
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> octree = Octree(box())
+        >>> octree.all_hits([0.5, 0.25, 3], [0, 0, -1]).interpolate(octree.mesh.vertices[:, 2])
+        array([1., 0.])
+        """
+        return interpolated(self._mesh, self.face, self.u, self.v, values, on)
 
 
 def points_on(

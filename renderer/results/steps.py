@@ -8,14 +8,20 @@ from numpy.typing import NDArray
 
 @dataclass(eq=False, slots=True)
 class Steps:
-    """Steps of the search for each ray's closest hit, of a ray that travels alone and goes to the nearest boxes first.
+    """The steps of each ray's search for its closest hit, if it travels alone and visits the nearest boxes first.
 
-    nodes      (...) int64, the nodes entered, whose eight boxes are tested at once
-    triangles  (...) int64, the triangles tested
+    Attributes
+    ----------
+    nodes : ndarray of int64, shape (...)
+        Nodes entered; the eight boxes of one are tested at once.
+    triangles : ndarray of int64, shape (...)
+        Triangles tested.
 
+    Examples
+    --------
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box
-    >>> steps = Octree.from_mesh(box()).count_steps([[0.5, 0.25, 3], [5, 5, 5]], [[0, 0, -1], [0, 0, -1]])
+    >>> steps = Octree(box()).count_steps([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1])
     >>> steps.nodes, steps.triangles
     (array([1, 1]), array([4, 0]))
     """

@@ -1,4 +1,4 @@
-"""Changes of a scene by a few lines of TOML, as the command line takes them."""
+"""Changes of a scene by lines of TOML: the option ``--change``."""
 
 import tomllib
 from typing import Any
@@ -8,7 +8,7 @@ from pydantic import Field, ValidationError
 from renderer.errors import expect
 from renderer.scene.fields import Fields, first_fault
 from renderer.scene.hide import without
-from renderer.scene.scene import AnyCamera, AnyLight, AnyMaterial, Scene, checked_settings
+from renderer.scene.scene import AnyCamera, AnyLight, AnyMaterial, Scene, checked_settings, warn_of_slips
 
 
 class _Changes(Fields):
@@ -20,8 +20,8 @@ class _Changes(Fields):
 
 
 def changed(scene: Scene, text: str) -> Scene:
-    """``scene`` with what ``text`` has of a scene file in its place: camera, lights, single materials, and single keys
-    of ``render``; and without the objects that a list ``hide`` names, such as ``objects.0`` or ``floor``.
+    """``scene`` with the camera, the lights, the materials and the keys of ``render`` in the TOML ``text``, and without
+    the objects in its list ``hide``, such as ``objects.0`` or ``floor``.
 
     Raises ``ValueError`` with one line that names the key.
 
@@ -45,4 +45,6 @@ def changed(scene: Scene, text: str) -> Scene:
     found = {"camera": changes.camera, "lights": changes.lights}
     given: dict[str, Any] = {key: value for key, value in found.items() if value is not None}
     given["materials"] = {**scene.materials, **changes.materials}
-    return without(scene.altered(**given, render=checked_settings(scene.render, changes.render)), changes.hide)
+    altered = scene.altered(**given, render=checked_settings(scene.render, changes.render))
+    warn_of_slips(changes.camera, changes.materials, "")
+    return without(altered, changes.hide)

@@ -1,8 +1,10 @@
 """The base of the scene classes: types of fields, checks for unknown and wrong values, and one line per fault."""
 
 import re
-from collections.abc import Callable
-from typing import Annotated, Any
+import warnings
+from collections.abc import Callable, Iterable
+from functools import wraps
+from typing import Annotated, Any, Concatenate, ParamSpec
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
@@ -27,6 +29,21 @@ _Channel = Annotated[float, Field(ge=0.0, allow_inf_nan=False, strict=True)]
 Color = Annotated[tuple[_Channel, _Channel, _Channel], BeforeValidator(thrice)]
 
 
+class SceneWarning(UserWarning):
+    """A value that is allowed, and that is probably a slip: an angle in radians, or a colour from 0 to 255.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> from renderer import Phong
+    >>> with warnings.catch_warnings(record=True) as caught:
+    ...     warnings.simplefilter("always")
+    ...     red = Phong(diffuse=(255, 0, 0))
+    >>> print(caught[0].message)
+    Phong: diffuse: expected numbers from 0 to 1, got (255.0, 0.0, 0.0). Divide 8-bit colours by 255.
+    """
+
+
 class Fields(BaseModel):
     """A record whose fields are checked when it is made, and do not change.
 
@@ -40,6 +57,16 @@ class Fields(BaseModel):
             super().__init__(**values)
         except ValidationError as error:
             raise SceneError(f"{type(self).__name__}: {first_fault(error, self._union_member)}") from None
+        for slip in self._slips():
+            warnings.warn(f"{type(self).__name__}: {slip}", SceneWarning, stacklevel=3)
+
+    def __dir__(self) -> list[str]:
+        """Fields and methods of this project, without those of pydantic."""
+        return [name for name in super().__dir__() if name.startswith("__") or not hasattr(BaseModel, name)]
+
+    def _slips(self) -> Iterable[str]:
+        """A line for each value that is allowed and looks like a slip."""
+        return ()
 
     @model_validator(mode="before")
     @classmethod
@@ -54,6 +81,27 @@ class Fields(BaseModel):
     def _union_member(keys: Keys) -> int | None:
         """The place in ``keys`` of the name of a union's member; see ``first_fault``."""
         return None
+
+
+Stated = ParamSpec("Stated")
+
+
+def stated(signature: Callable[Concatenate[Any, Stated], None]) -> Callable[Concatenate[Any, Stated], None]:
+    """``Fields.__init__`` with the signature that a class states, for type checkers and ``help``.
+
+    Fields are typed by what they hold, such as three numbers; the signature has all that they are made of.
+    """
+
+    @wraps(signature)
+    def init(self: Fields, /, *unnamed: object, **values: Any) -> None:
+        if unnamed:
+            keys = ", ".join(f"{key}=..." for key in type(self).model_fields if key != "type")
+            call = f"{type(self).__name__}({keys})"
+            raise TypeError(f"expected keywords, as in {call}, got {shown(unnamed[0])} without its name")
+        Fields.__init__(self, **values)
+
+    init.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # as for that of ``Fields``
+    return init
 
 
 def _unpacked(value: object) -> object:
@@ -80,6 +128,8 @@ def first_fault(error: ValidationError, member: Callable[[Keys], int | None] = l
     got = "" if says_it else f", got {_value(first['input'])}"
     if first["type"] in ("union_tag_not_found", "union_tag_invalid"):
         message, got = _type_message(first["ctx"]), ""
+    if first["type"] == "missing" and isinstance(first["input"], dict):
+        got = ", got none"
     if first["type"] == "extra_forbidden":
         message, got = "unknown key", f" (its value is {shown(first['input'])})"
     others = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
@@ -92,6 +142,10 @@ _WORDS = (
     (r"^Input should (be|have) (a valid )?", "expected "),
     (r"^expected (greater|less) ", r"expected a number \1 "),
     (r"^expected (tuple|list)\b", "expected a list"),
+    (r"^expected dictionary or instance of (\w+)", r"expected a table or a \1"),
+    (r"^expected dictionary or object to extract fields from", "expected a table or an object of its class"),
+    (r"^Field required", "expected a value"),
+    (r"^Tuple should have (at \w+ \d+ items?) after validation.*", r"expected \1"),
     (r"^expected integer", "expected an integer"),
     (r"^expected (number|string|dictionary|boolean)\b", r"expected a \1"),
 )
@@ -115,12 +169,19 @@ def _value(value: object) -> str:
     return repr(value) if isinstance(value, str) else shown(value)
 
 
+# The most characters of a value that an error quotes.
+_MOST = 200
+
+
 def shown(value: object) -> str:
     """A value or key on one line; Python writes no integer of more than 4300 digits."""
     if isinstance(value, str) and value.isprintable() and value:
         return value if value.replace("-", "").replace("_", "").isalnum() else repr(value)
+    if type(value).__module__.partition(".")[0] == __name__.partition(".")[0]:
+        return type(value).__name__
     try:
-        return repr(value)
+        text = repr(value)
+        return text if len(text) <= _MOST else f"{' '.join(text[:_MOST].split())} ..."
     except ValueError:
         return "an integer of more than 4300 digits"
     except RecursionError:

@@ -1,4 +1,4 @@
-"""Objects of a scene that are left out."""
+"""Scenes without some of their objects."""
 
 from collections.abc import Collection
 
@@ -9,8 +9,7 @@ FLOOR = "floor"
 
 
 def object_names(scene: Scene) -> tuple[str, ...]:
-    """The names by which objects are hidden, as errors of scene files have them: ``objects.0`` and so on, and
-    ``floor`` where there is one.
+    """The names of objects, as in errors of scene files: ``objects.0`` and so on, and ``floor`` if there is one.
 
     >>> from renderer import load_scene
     >>> object_names(load_scene("scenes/stairs.toml"))
@@ -20,8 +19,9 @@ def object_names(scene: Scene) -> tuple[str, ...]:
 
 
 def without(scene: Scene, hidden: Collection[str]) -> Scene:
-    """``scene`` without the objects of those names, which shares the meshes of the others: none is loaded or placed
-    again. Raises ``ValueError`` for a name that no object has.
+    """``scene`` without the objects of these names. It shares the other meshes: none is loaded or placed again.
+
+    Raises ``ValueError`` for an unknown name.
 
     >>> from renderer import load_scene
     >>> scene = load_scene("scenes/stairs.toml")

@@ -1,12 +1,16 @@
 """Materials, and how each is written as a row for the kernels."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable
 from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from renderer.scene.fields import Color, Fields
+from renderer.arguments.types import ArrayLike
+from renderer.scene.fields import Color, Fields, stated
 from renderer.shade.records import DIELECTRIC, LAMBERT, MIRROR, PHONG, UNLIT
 
 _Ior = Annotated[float, Field(gt=0.0, allow_inf_nan=False, strict=True)]
@@ -14,12 +18,53 @@ _BLACK = (0.0, 0.0, 0.0)
 _WHITE = (1.0, 1.0, 1.0)
 
 
-class Phong(Fields):
-    """Ambient, diffuse and specular light with a constant reflected and transmitted part.
+class _Material(Fields):
+    def _slips(self) -> Iterable[str]:
+        """Colours that would return more light than arrives."""
+        for name in ("diffuse", "specular", "reflectance", "transmittance"):
+            color = getattr(self, name, _BLACK)
+            if max(color) > 1.0:
+                yield f"{name}: expected numbers from 0 to 1, got {color}. Divide 8-bit colours by 255."
 
-    ``ambient`` (k_a) is ``diffuse`` unless given. Under total internal reflection there is no transmitted part. Bodies
-    that touch or overlap are as for ``Dielectric``.
 
+class Phong(_Material):
+    """Ambient, diffuse and specular light, with a constant reflected and transmitted share.
+
+    A colour is one number, or red, green and blue; usual values are from 0 to 1.
+
+    Parameters
+    ----------
+    diffuse : float or array_like, shape (3,), default 0.8
+        The share of light that is scattered evenly.
+    ambient : float or array_like, shape (3,), optional
+        The share of the scene's ambient light. By default that of ``diffuse``.
+    specular : float or array_like, shape (3,), default 0
+        The strength of highlights.
+    shininess : float, default 32
+        The exponent of highlights: the greater, the smaller they are.
+    reflectance : float or array_like, shape (3,), default 0
+        The share of mirrored light.
+    transmittance : float or array_like, shape (3,), default 0
+        The share of light that goes through the surface. Under total internal reflection there is none.
+    ior : float, default 1.5
+        The index of refraction.
+
+    Raises
+    ------
+    SceneError
+        For values that are negative or not finite.
+
+    Warns
+    -----
+    SceneWarning
+        Where a colour other than ``ambient`` is above 1.
+
+    Notes
+    -----
+    ``Dielectric`` says how bodies that touch or overlap share their surface.
+
+    Examples
+    --------
     >>> from renderer import Phong
     >>> red = Phong(diffuse=(0.7, 0.1, 0.1), specular=0.2, shininess=50)
     >>> red.specular, red.reflectance
@@ -35,10 +80,26 @@ class Phong(Fields):
     transmittance: Color = _BLACK
     ior: _Ior = 1.5
 
+    @stated
+    def __init__(
+        self,
+        *,
+        diffuse: ArrayLike = 0.8,
+        ambient: ArrayLike | None = None,
+        specular: ArrayLike = 0.0,
+        shininess: float = 32.0,
+        reflectance: ArrayLike = 0.0,
+        transmittance: ArrayLike = 0.0,
+        ior: float = 1.5,
+        type: Literal["phong"] = "phong",
+    ) -> None: ...
+
     @property
     def passes_light(self) -> bool:
-        """Whether rays go through the surface into the object.
+        """Whether rays go through the surface.
 
+        Examples
+        --------
         >>> from renderer import Phong
         >>> Phong().passes_light, Phong(transmittance=0.5).passes_light
         (False, True)
@@ -49,27 +110,35 @@ class Phong(Fields):
     def receives_light(self) -> bool:
         """Whether direct light changes the look of the surface.
 
+        Examples
+        --------
         >>> from renderer import Phong
         >>> Phong().receives_light, Phong(diffuse=0, ambient=1).receives_light
         (True, False)
         """
         return any(self.diffuse) or any(self.specular)
 
-    @property
-    def kind(self) -> int:
-        """The kind for the kernels, PHONG, LAMBERT or UNLIT, by the colours that are not black."""
-        return PHONG if any(self.specular) else LAMBERT if any(self.diffuse) else UNLIT
 
-    def row(self) -> NDArray[np.float64]:
-        """(MATERIAL_COLUMNS,) float64."""
-        ambient = self.diffuse if self.ambient is None else self.ambient
-        colors = (*ambient, *self.diffuse, *self.specular, *self.reflectance, *self.transmittance)
-        return np.array([self.kind, *colors, self.shininess, self.ior])
+class Mirror(_Material):
+    """A perfect mirror: reflected light and nothing else.
 
+    Parameters
+    ----------
+    reflectance : float or array_like, shape (3,), default 1
+        The share of mirrored light: one number, or red, green and blue.
 
-class Mirror(Fields):
-    """A perfect mirror: ``reflectance`` times the reflected light, nothing else.
+    Raises
+    ------
+    SceneError
+        For values that are negative or not finite.
 
+    Warns
+    -----
+    SceneWarning
+        Where a colour is above 1.
+
+    Examples
+    --------
     >>> from renderer import Mirror
     >>> Mirror(reflectance=0.9).reflectance
     (0.9, 0.9, 0.9)
@@ -78,28 +147,51 @@ class Mirror(Fields):
     type: Literal["mirror"] = "mirror"
     reflectance: Color = _WHITE
 
+    @stated
+    def __init__(self, *, reflectance: ArrayLike = 1.0, type: Literal["mirror"] = "mirror") -> None: ...
+
     @property
     def passes_light(self) -> bool:
-        """Never: the object behind a mirror is not seen.
+        """False: nothing is seen through a mirror.
 
+        Examples
+        --------
         >>> from renderer import Mirror
         >>> Mirror().passes_light
         False
         """
         return False
 
-    def row(self) -> NDArray[np.float64]:
-        """(MATERIAL_COLUMNS,) float64."""
-        return np.array([MIRROR, *_BLACK, *_BLACK, *_BLACK, *self.reflectance, *_BLACK, 0.0, 1.0])
 
+class Dielectric(_Material):
+    """Clear glass or water: light is reflected and refracted by Fresnel's equations.
 
-class Dielectric(Fields):
-    """Clear glass of index ``ior``: Fresnel's share reflected, the rest refracted, tinted by the two colours.
+    Parameters
+    ----------
+    ior : float, default 1.5
+        The index of refraction.
+    reflectance, transmittance : float or array_like, shape (3,), default 1
+        Factors of the reflected and the refracted light: one number, or red, green and blue.
 
-    Bodies that touch have no air between them: faces that coincide are crossed at once, from the medium before all of
-    them to the medium after all, by the colours of the one that is first in the scene; an opaque one stops the ray.
-    Where bodies overlap, the one that the ray entered last holds; of those entered at one place, the last in the scene.
+    Raises
+    ------
+    SceneError
+        For values that are negative or not finite.
 
+    Warns
+    -----
+    SceneWarning
+        Where a colour is above 1.
+
+    Notes
+    -----
+    Bodies that touch have no air between them. A ray crosses faces that coincide at once, from the medium before all of
+    them to the medium after all, and takes the colours of the face that is first in the scene. An opaque face stops it.
+    Where bodies overlap, the medium is that of the body which the ray entered last; of those entered at one point, that
+    of the last in the scene.
+
+    Examples
+    --------
     >>> from renderer import Dielectric
     >>> green = Dielectric(ior=1.33, transmittance=(0.8, 1, 0.8))
     >>> green.ior, green.reflectance
@@ -111,20 +203,48 @@ class Dielectric(Fields):
     reflectance: Color = _WHITE
     transmittance: Color = _WHITE
 
+    @stated
+    def __init__(
+        self,
+        *,
+        ior: float = 1.5,
+        reflectance: ArrayLike = 1.0,
+        transmittance: ArrayLike = 1.0,
+        type: Literal["dielectric"] = "dielectric",
+    ) -> None: ...
+
     @property
     def passes_light(self) -> bool:
-        """Whether rays go through the surface into the object.
+        """Whether rays go through the surface.
 
+        Examples
+        --------
         >>> from renderer import Dielectric
         >>> Dielectric().passes_light, Dielectric(transmittance=0).passes_light
         (True, False)
         """
         return any(self.transmittance)
 
-    def row(self) -> NDArray[np.float64]:
-        """(MATERIAL_COLUMNS,) float64."""
-        colors = (*_BLACK, *_BLACK, *_BLACK, *self.reflectance, *self.transmittance)
-        return np.array([DIELECTRIC, *colors, 0.0, self.ior])
-
 
 Material = Phong | Mirror | Dielectric
+
+
+def kind_of(material: Material) -> int:
+    """The kind of a material for the kernels. That of ``Phong`` goes by the colours that are not black."""
+    if isinstance(material, Mirror):
+        return MIRROR
+    if isinstance(material, Dielectric):
+        return DIELECTRIC
+    return PHONG if any(material.specular) else LAMBERT if any(material.diffuse) else UNLIT
+
+
+def material_row(material: Material) -> NDArray[np.float64]:
+    """A material as the kernels read it, (MATERIAL_COLUMNS,)."""
+    kind = kind_of(material)
+    if isinstance(material, Mirror):
+        return np.array([kind, *_BLACK, *_BLACK, *_BLACK, *material.reflectance, *_BLACK, 0.0, 1.0])
+    passed = (*material.reflectance, *material.transmittance)
+    if isinstance(material, Dielectric):
+        return np.array([kind, *_BLACK, *_BLACK, *_BLACK, *passed, 0.0, material.ior])
+    ambient = material.diffuse if material.ambient is None else material.ambient
+    return np.array([kind, *ambient, *material.diffuse, *material.specular, *passed, material.shininess, material.ior])

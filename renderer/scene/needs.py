@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from renderer.arguments.counts import count_argument
 from renderer.errors import expect
+from renderer.scene.light import light_row
 from renderer.scene.material import Phong
 from renderer.scene.scene import Instance, Scene
 
@@ -23,17 +24,29 @@ FEW_FACES = 24
 
 @dataclass(frozen=True)
 class Features:
-    """The features that a picture needs; ``dataclasses.replace`` switches more on, which changes no bit of it.
+    """The features that a picture needs. More of them, by ``dataclasses.replace``, change no bit of it.
 
-    reflection        reflected rays
-    refraction        refracted rays, and the media that each ray is in
-    shadows           direct light, and shadow rays for it
-    specular          highlights
-    smooth_normals    interpolated normals
-    lights            the number of lights: those that shine on something
-    float64_vertices  vertices that float32 does not hold exactly
-    octree            a tree; without it every ray is tested against every face
+    Attributes
+    ----------
+    reflection : bool
+        Reflected rays.
+    refraction : bool
+        Refracted rays, and the media that each ray is in.
+    shadows : bool
+        Direct light, and shadow rays.
+    specular : bool
+        Highlights.
+    smooth_normals : bool
+        Interpolated normals.
+    lights : int
+        The number of lights that shine on something.
+    float64_vertices : bool
+        Vertices that float32 does not hold exactly.
+    octree : bool
+        A tree. Without it every ray is tested against every face.
 
+    Examples
+    --------
     >>> from renderer import PerspectiveCamera, Phong, Scene, SceneObject, needs_of
     >>> from renderer.mesh.shapes import icosphere
     >>> ball = SceneObject(mesh=icosphere(3), material="grey", normals="smooth")
@@ -77,7 +90,7 @@ def examine(scene: Scene, max_depth: int | None = None) -> tuple[Finding, ...]:
     used = {i.material: scene.materials[i.material] for i in present}
     phong = {name: m for name, m in used.items() if isinstance(m, Phong)}
     # rule: shining-lights
-    shining = sum(any(light.row()[4:]) for light in scene.lights)
+    shining = sum(any(light_row(light)[4:]) for light in scene.lights)
     faces = sum(len(i.mesh.faces) for i in present)
     receiving = _lit("shadows", "receives direct light", shining, (n for n, m in phong.items() if m.receives_light))
     return (
@@ -93,10 +106,26 @@ def examine(scene: Scene, max_depth: int | None = None) -> tuple[Finding, ...]:
 
 
 def needs_of(scene: Scene, max_depth: int | None = None) -> Features:
-    """The ``Features`` of a picture of ``scene`` with ``max_depth`` bounces, by default the scene's own.
+    """The features that a picture of a scene needs.
 
-    Raises ``ValueError`` naming the argument.
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    max_depth : int, optional
+        The number of bounces, by default the scene's own.
 
+    Returns
+    -------
+    Needs
+
+    Raises
+    ------
+    ValueError
+        For a bad argument, which the message names.
+
+    Examples
+    --------
     >>> from renderer import PerspectiveCamera, Scene, needs_of
     >>> empty = Scene(camera=PerspectiveCamera(eye=(0, 0, 1), target=(0, 0, 0)), materials={})
     >>> needs_of(empty).shadows
@@ -130,7 +159,7 @@ def checked_needs(needs: Features | None, scene: Scene, max_depth: int) -> Featu
 
 def lit_materials(scene: Scene) -> list[Phong]:
     """The Phong materials of faces, none where no light shines."""
-    if not any(any(light.row()[4:]) for light in scene.lights):
+    if not any(any(light_row(light)[4:]) for light in scene.lights):
         return []
     used = (scene.materials[i.material] for i in _present(scene))
     return [material for material in used if isinstance(material, Phong)]

@@ -1,26 +1,32 @@
 """Scenes: the contents of a TOML file, and the world-space triangles that it describes.
 
-Units are scene units and degrees, y is up. Paths are relative to the scene file. An unknown key, a missing file or a
-bad value is one ``SceneError`` that names the file, the key's path, the value that was expected and the one given.
+Units are scene units and degrees. Paths are relative to the scene file. An unknown key, a missing file or a bad value
+is one ``SceneError`` that names the file, the key's path, the value that was expected and the one given.
 """
+
+from __future__ import annotations
 
 import os
 import tomllib
+import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
-from renderer.errors import MeshError, SceneError, expect
+from renderer.arguments.types import ArrayLike
+from renderer.arguments.up import UP_AXES, up_axis
+from renderer.errors import MeshError, NoSuchSceneError, SceneError, expect, expect_known
 from renderer.lazy import lazy
 from renderer.mesh.load import MESH_SUFFIXES, load_mesh
 from renderer.mesh.mesh import Mesh
-from renderer.scene.camera import OrthographicCamera, PerspectiveCamera, sample_offsets
-from renderer.scene.fields import Color, Fields, FiniteVector, Keys, first_fault, shown, thrice
-from renderer.scene.light import DirectionalLight, PointLight
+from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera, sample_offsets
+from renderer.scene.fields import Color, Fields, FiniteVector, Keys, SceneWarning, first_fault, shown, stated, thrice
+from renderer.scene.light import DirectionalLight, Light, PointLight
 from renderer.scene.material import Material
 from renderer.scene.showcase import showcase_text
 from renderer.system.files import as_path, read_whole, write_atomically
@@ -57,42 +63,90 @@ def _path_or_mesh(value: Any) -> Any:
 UNLIMITED_RAYS = 2**62 - 1
 
 
+def _twice(value: Any) -> Any:
+    """Let one number stand for width and height."""
+    return (value, value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
 class RenderSettings(Fields):
-    """Defaults of ``render``; each can be given there instead.
+    """How a scene is rendered; each setting can also be an argument of ``render``.
 
-    ``max_depth`` is the number of bounces: 0 shows what the eye sees directly. ``min_weight`` ends a ray whose
-    largest weight is below it; it bounds no error when rays branch, because the cut ones may be many. Once a sample of
-    a pixel has taken ``max_rays`` its surfaces leave no more rays, and ``render`` warns of the pixels that miss some:
-    mirrors that halve their light, or glass in glass, may double the rays with each bounce. The default is more than
-    full branching makes in ten bounces under three lights. Without ``shadows`` nothing hides a light from the surfaces
-    that face it, and no shadow ray is traced.
+    Parameters
+    ----------
+    resolution : int or (int, int), default 512
+        Width and height in pixels, from 1 to 16384; one number is both.
+    samples : int, default 1
+        Samples a pixel: 1, 4, 9 or another square number up to 65536.
+    max_depth : int, default 6
+        The number of bounces, from 0 to 64. 0 shows what the eye sees directly.
+    min_weight : float, default 0
+        A ray ends when its largest weight is below this number, which is less than 1. Where rays branch this bounds no
+        error, because many rays may end.
+    max_rays : int, default 16384
+        The most rays of a sample of a pixel. After that its surfaces leave no more rays, and ``render`` warns with
+        ``CutWarning``. Half-mirrors, or glass within glass, may double the rays with each bounce. The default is more
+        than full branching makes in ten bounces under three lights.
+    shadows : bool, default True
+        Whether surfaces hide lights. If not, no shadow rays are traced.
 
+    Raises
+    ------
+    SceneError
+        For a value out of its range.
+
+    Examples
+    --------
     >>> from renderer import RenderSettings
     >>> RenderSettings(resolution=(640, 360), samples=4).max_depth
     6
     """
 
-    resolution: tuple[_Pixels, _Pixels] = (512, 512)
+    resolution: Annotated[tuple[_Pixels, _Pixels], BeforeValidator(_twice)] = (512, 512)
     samples: Annotated[int, Field(le=65536, strict=True)] = 1
     max_depth: Annotated[int, Field(ge=0, le=64, strict=True)] = 6
     min_weight: Annotated[float, Field(ge=0.0, lt=1.0, strict=True)] = 0.0
     max_rays: Annotated[int, Field(ge=1, le=UNLIMITED_RAYS, strict=True)] = 16384
     shadows: Annotated[bool, Field(strict=True)] = True
 
+    @stated
+    def __init__(
+        self,
+        *,
+        resolution: int | Sequence[int] = (512, 512),
+        samples: int = 1,
+        max_depth: int = 6,
+        min_weight: float = 0.0,
+        max_rays: int = 16384,
+        shadows: bool = True,
+    ) -> None: ...
+
     @model_validator(mode="after")
-    def _square_samples(self) -> "RenderSettings":
+    def _square_samples(self) -> RenderSettings:
         sample_offsets(self.samples)
         return self
 
 
-def checked_settings(defaults: RenderSettings, given: dict[str, Any]) -> RenderSettings:
+_USUAL = RenderSettings()
+
+
+class GivenSettings(TypedDict, total=False):
+    """Keyword arguments that take the place of a scene's ``RenderSettings``; None leaves the scene's."""
+
+    resolution: int | Sequence[int] | None
+    samples: int | None
+    max_depth: int | None
+    min_weight: float | None
+    max_rays: int | None
+    shadows: bool | None
+
+
+def checked_settings(defaults: RenderSettings, given: Mapping[str, Any]) -> RenderSettings:
     """``defaults`` with the settings that are given, and not None, in their place, checked as a file's would be.
 
     Raises ``ValueError`` with one line that names the setting.
     """
-    known = RenderSettings.model_fields
     for name in given:
-        expect(name in known, "render", f"settings among {sorted(known)}", repr(name))
+        expect_known("render", name, sorted(RenderSettings.model_fields))
     values = {k: v for k, v in given.items() if v is not None}
     try:
         return RenderSettings.model_validate({**defaults.model_dump(), **values})
@@ -101,13 +155,36 @@ def checked_settings(defaults: RenderSettings, given: dict[str, Any]) -> RenderS
 
 
 class SceneObject(Fields):
-    """A mesh in the world: scaled, then turned about x, y and z (degrees, in this order), then moved.
+    """A mesh in the world: scaled, then turned about x, y and z in this order, then moved.
 
-    Its corners are float64 numbers, whatever those of its file are.
+    Parameters
+    ----------
+    mesh : Mesh or path
+        The mesh, or its file.
+    material : str
+        The name of one of the scene's materials.
+    normals : {"flat", "smooth"}, default "flat"
+        Whether shading interpolates the normals of vertices: those of the file, or else means of the faces around.
+    scale : float or array_like, shape (3,), default 1
+        The factor of all axes, or of each.
+    rotate : array_like, shape (3,), default (0, 0, 0)
+        Angles about x, y and z, in degrees.
+    translate : array_like, shape (3,), default (0, 0, 0)
+        The move.
 
-    >>> from renderer import PerspectiveCamera, Phong, Scene, SceneObject
-    >>> from renderer.mesh.shapes import box
-    >>> crate = SceneObject(mesh=box(), material="wood", scale=2, translate=(0, 1, 0))
+    Raises
+    ------
+    SceneError
+        For values that are not finite.
+
+    Notes
+    -----
+    Vertices are float64 numbers, whatever those of the file are.
+
+    Examples
+    --------
+    >>> from renderer import PerspectiveCamera, Phong, Scene, SceneObject, shapes
+    >>> crate = SceneObject(mesh=shapes.box(), material="wood", scale=2, translate=(0, 1, 0))
     >>> eye = PerspectiveCamera(eye=(0, 2, 9), target=(0, 1, 0))
     >>> scene = Scene(camera=eye, materials={"wood": Phong()}, objects=[crate])
     >>> [corner.tolist() for corner in scene.instances[0].mesh.bounds]
@@ -121,12 +198,30 @@ class SceneObject(Fields):
     rotate: FiniteVector = (0.0, 0.0, 0.0)
     translate: FiniteVector = (0.0, 0.0, 0.0)
 
-    def matrix(self) -> NDArray[np.float64]:
-        """Object to world, (4, 4) float64.
+    @stated
+    def __init__(
+        self,
+        *,
+        mesh: Mesh | str | os.PathLike[str],
+        material: str,
+        normals: Literal["flat", "smooth"] = "flat",
+        scale: ArrayLike = 1.0,
+        rotate: ArrayLike = (0.0, 0.0, 0.0),
+        translate: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> None: ...
 
-        >>> from renderer import SceneObject
-        >>> from renderer.mesh.shapes import box
-        >>> SceneObject(mesh=box(), material="wood", rotate=(0, 90, 0), translate=(0, 1, 0)).matrix().round(12) + 0.0
+    def matrix(self) -> NDArray[np.float64]:
+        """The transformation from the mesh's coordinates to the world's.
+
+        Returns
+        -------
+        ndarray, shape (4, 4), float64
+
+        Examples
+        --------
+        >>> from renderer import SceneObject, shapes
+        >>> crate = SceneObject(mesh=shapes.box(), material="wood", rotate=(0, 90, 0), translate=(0, 1, 0))
+        >>> crate.matrix().round(12) + 0.0
         array([[ 0.,  0.,  1.,  0.],
                [ 0.,  1.,  0.,  1.],
                [-1.,  0.,  0.,  0.],
@@ -142,8 +237,26 @@ class SceneObject(Fields):
 
 
 class Floor(Fields):
-    """The plane y = 0 cut to the rectangle from ``min`` to ``max`` (x, z), tiled with its materials in turn.
+    """A rectangle of the ground, tiled with its materials in turn.
 
+    It lies at height 0: in the plane y = 0, or x = 0 or z = 0 where the scene has this axis ``up``.
+
+    Parameters
+    ----------
+    min, max : array_like, shape (2,)
+        Its least and greatest corner by the two axes that are not up, in their order: (x, z) where y is up.
+    materials : sequence of str
+        The names of one or two of the scene's materials.
+    squares : (int, int), default (1, 1)
+        The number of tiles along these axes, from 1 to 1000.
+
+    Raises
+    ------
+    SceneError
+        For corners that are not finite, or of which the first is not the least.
+
+    Examples
+    --------
     >>> from renderer import Floor, PerspectiveCamera, Phong, Scene
     >>> floor = Floor(min=(-4, -4), max=(4, 4), materials=["light", "dark"], squares=(8, 8))
     >>> eye = PerspectiveCamera(eye=(0, 2, 9), target=(0, 0, 0))
@@ -157,10 +270,15 @@ class Floor(Fields):
     materials: Annotated[tuple[str, ...], Field(min_length=1, max_length=2)]
     squares: tuple[_Squares, _Squares] = (1, 1)
 
+    @stated
+    def __init__(
+        self, *, min: ArrayLike, max: ArrayLike, materials: Sequence[str], squares: Sequence[int] = (1, 1)
+    ) -> None: ...
+
     @model_validator(mode="after")
-    def _not_empty(self) -> "Floor":
+    def _not_empty(self) -> Floor:
         if not (np.isfinite([*self.min, *self.max]).all() and self.min[0] < self.max[0] and self.min[1] < self.max[1]):
-            raise ValueError("expected finite min < max in x and z")
+            raise ValueError("expected finite min < max in both directions")
         return self
 
 
@@ -178,15 +296,57 @@ class Instance:
         return self.mesh.normals if self.mesh.normals is not None else self.mesh.vertex_normals()
 
 
-class Scene(Fields):
-    """Everything that a picture needs. Read one with ``load_scene`` or build it from keyword arguments.
+class SceneChanges(TypedDict, total=False):
+    """Keyword arguments of ``Scene.altered``."""
 
-    >>> from renderer import PerspectiveCamera, Phong, Scene, SceneObject, render
-    >>> from renderer.mesh.shapes import icosphere
-    >>> ball = SceneObject(mesh=icosphere(3), material="grey", normals="smooth")
+    camera: Camera | Mapping[str, Any]
+    materials: Mapping[str, Material | Mapping[str, Any]]
+    lights: Sequence[Light | Mapping[str, Any]]
+    ambient: ArrayLike
+    background: ArrayLike
+    render: RenderSettings | Mapping[str, Any]
+
+
+class Scene(Fields):
+    """Everything that a picture needs. ``load_scene`` reads one from a file.
+
+    Parameters
+    ----------
+    camera : PerspectiveCamera or OrthographicCamera
+        The camera.
+    materials : dict of str to Phong, Mirror or Dielectric
+        Materials by the names that objects have for them.
+    lights : sequence of DirectionalLight or PointLight, default ()
+        The lights.
+    objects : sequence of SceneObject, default ()
+        The meshes. Faces of the scene are numbered in this order.
+    floor : Floor, optional
+        A rectangle of the ground; its faces come last.
+    ambient : float or array_like, shape (3,), default 0
+        Light from everywhere, for the ``ambient`` of ``Phong``.
+    background : float or array_like, shape (3,), default 0
+        The radiance where a ray hits nothing.
+    up : {"x", "y", "z"}, default "y"
+        The axis that points up: that of the floor, and of a camera that has no ``up`` of its own.
+    render : RenderSettings, optional
+        The settings of its pictures.
+
+    Raises
+    ------
+    SceneError
+        For a value out of its range, or a material that is not there.
+
+    Notes
+    -----
+    Each of these may also be a table as in a scene file, such as ``camera={"eye": (0, 0, 5), "target": (0, 0, 0)}``.
+
+    Examples
+    --------
+    >>> from renderer import PerspectiveCamera, Phong, Scene, SceneObject, render, shapes
+    >>> ball = SceneObject(mesh=shapes.icosphere(3), material="grey", normals="smooth")
     >>> eye = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
     >>> scene = Scene(camera=eye, materials={"grey": Phong()}, objects=[ball], ambient=1, background=(0.2, 0.4, 1))
-    >>> render(scene, resolution=(3, 3)).srgb[1].tolist()
+    >>> render(scene, resolution=3).srgb[1].tolist()
     [[124, 170, 255], [231, 231, 231], [124, 170, 255]]
     """
 
@@ -197,10 +357,45 @@ class Scene(Fields):
     floor: Floor | None = None
     ambient: Color = (0.0, 0.0, 0.0)
     background: Color = (0.0, 0.0, 0.0)
-    render: RenderSettings = RenderSettings()
+    up: Literal["x", "y", "z"] = "y"
+    render: RenderSettings = _USUAL
+
+    @stated
+    def __init__(
+        self,
+        *,
+        camera: Camera | Mapping[str, Any],
+        materials: Mapping[str, Material | Mapping[str, Any]],
+        lights: Sequence[Light | Mapping[str, Any]] = (),
+        objects: Sequence[SceneObject | Mapping[str, Any]] = (),
+        floor: Floor | Mapping[str, Any] | None = None,
+        ambient: ArrayLike = 0.0,
+        background: ArrayLike = 0.0,
+        up: Literal["x", "y", "z"] = "y",
+        render: RenderSettings | Mapping[str, Any] = _USUAL,
+    ) -> None: ...
+
+    @model_validator(mode="before")
+    @classmethod
+    def _lists(cls, values: Any) -> Any:
+        for name in ("lights", "objects"):
+            if isinstance(values, dict) and isinstance(one := values.get(name), Fields):
+                raise ValueError(f"{name}: expected a list, got one {type(one).__name__}")
+        return values
+
+    @model_validator(mode="before")
+    @classmethod
+    def _upright(cls, values: Any) -> Any:
+        """Let a camera that has no ``up`` of its own have the scene's."""
+        if not isinstance(values, dict) or values.get("up") not in ("x", "z"):
+            return values
+        camera, up = values.get("camera"), tuple(np.eye(3)[UP_AXES[values["up"]]].tolist())
+        if isinstance(camera, PerspectiveCamera | OrthographicCamera) and "up" not in camera.model_fields_set:
+            camera = type(camera).model_validate({**camera.model_dump(), "up": up})
+        return {**values, "camera": {"up": up, **camera} if isinstance(camera, dict) else camera}
 
     @model_validator(mode="after")
-    def _materials_exist(self) -> "Scene":
+    def _materials_exist(self) -> Scene:
         used = [(f"objects.{i}.material", o.material) for i, o in enumerate(self.objects)]
         used += [("floor.materials", name) for name in (self.floor.materials if self.floor else ())]
         for where, name in used:
@@ -214,11 +409,12 @@ class Scene(Fields):
 
     @lazy
     def instances(self) -> tuple[Instance, ...]:
-        """The world-space meshes: the objects in their order, then the floor's (one for each material).
+        """The meshes in world space: the objects in their order, then the floor's, one for each of its materials.
 
-        >>> from renderer import PerspectiveCamera, Phong, Scene, SceneObject
-        >>> from renderer.mesh.shapes import icosphere
-        >>> ball = SceneObject(mesh=icosphere(3), material="grey", normals="smooth")
+        Examples
+        --------
+        >>> from renderer import PerspectiveCamera, Phong, Scene, SceneObject, shapes
+        >>> ball = SceneObject(mesh=shapes.icosphere(3), material="grey", normals="smooth")
         >>> eye = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
         >>> scene = Scene(camera=eye, materials={"grey": Phong()}, objects=[ball])
         >>> [(part.material, part.smooth, part.mesh.name) for part in scene.instances]
@@ -228,29 +424,76 @@ class Scene(Fields):
             Instance(_place(_loaded(o.mesh), o.matrix()), o.material, o.normals == "smooth") for o in self.objects
         ]
         if self.floor is not None:
-            placed += [Instance(m, name, False) for m, name in _floor_meshes(self.floor)]
+            placed += [Instance(m, name, False) for m, name in _floor_meshes(self.floor, UP_AXES[self.up])]
         return tuple(placed)
 
-    def altered(self, **changes: object) -> "Scene":
-        """A copy with other values of fields, by name, that shares the meshes: none is loaded or placed again.
+    def altered(self, **changes: Unpack[SceneChanges]) -> Scene:
+        """A copy with other values of some fields. It shares the meshes: none is loaded or placed again.
 
-        So a change of ``objects`` or ``floor`` has no effect. Values are not checked as those of a scene file are.
+        Parameters
+        ----------
+        **changes
+            New values of ``camera``, ``materials``, ``lights``, ``ambient``, ``background`` or ``render``.
 
+        Returns
+        -------
+        Scene
+
+        Raises
+        ------
+        ValueError
+            For another name, and for values as of ``Scene``. Other objects, another floor or another ``up`` need a new
+            ``Scene``.
+
+        Examples
+        --------
         >>> from renderer import load_scene
         >>> scene = load_scene("scenes/stairs.toml")
         >>> dark = scene.altered(lights=())
         >>> len(scene.lights), len(dark.lights), dark.instances is scene.instances
         (2, 0, True)
         """
+        for name in changes:
+            if name in _PLACED:
+                raise ValueError(f"{name}: altered keeps the scene's meshes. Make a new Scene for another {name}.")
+            expect_known("Scene.altered", name, SceneChanges.__annotations__)
+        values: dict[str, Any] = {name: getattr(self, name) for name in type(self).model_fields}
+        checked = Scene(**{**values, **changes})
         _ = self.instances  # cached, so that the copy has it too
-        return self.model_copy(update=changes)
+        return self.model_copy(update={name: getattr(checked, name) for name in changes})
 
 
-def load_scene(path: str | Path) -> Scene:
-    """Read and check a scene file, and load its meshes; of a mesh file, the scene that ``showcase`` puts around it.
+# The fields of a scene that place its meshes.
+_PLACED = ("objects", "floor", "up")
 
-    Raises ``SceneError``.
 
+def load_scene(path: str | os.PathLike[str], *, up: Literal["x", "y", "z"] | None = None) -> Scene:
+    """Read a scene file and its meshes, or put a scene around a mesh file.
+
+    Parameters
+    ----------
+    path : path
+        A ``.toml`` file, or a mesh file (.ply, .obj, .stl, .glb). A camera that sees all of the mesh, two lights and a
+        floor are then chosen to fit; ``octree-render render --write-scene`` writes them as a scene file.
+    up : {"x", "y", "z"}, optional
+        The axis of a mesh file that points up, by default "y". A scene file has the key ``up`` instead.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    SceneError
+        For a file that cannot be read, an unknown key or a bad value; it names the file and the key.
+
+    Warns
+    -----
+    SceneWarning
+        For a value that is probably a slip.
+
+    Examples
+    --------
     >>> from renderer import load_scene
     >>> scene = load_scene("scenes/stairs.toml")
     >>> scene.camera.type, sorted(scene.materials), len(scene.objects)
@@ -262,13 +505,22 @@ def load_scene(path: str | Path) -> Scene:
             mesh = load_mesh(path)
         except MeshError as error:
             raise SceneError(str(error)) from None
-        table = tomllib.loads(showcase_text(mesh, "model"))
+        table = tomllib.loads(showcase_text(mesh, "model", _up_of_mesh(up)))
         table["objects"][0]["mesh"] = mesh
         return _checked(table, path)
+    if up is not None:
+        raise SceneError(f"up: expected None for a scene file, which has the key up, got {up!r}")
     return _checked(_table(path), path)
 
 
-def mesh_files(path: str | Path) -> list[Path]:
+def _up_of_mesh(up: str | None) -> str:
+    """The axis that is up in a mesh file: the one given, or y, which is that of GLB and most other files."""
+    if up is not None:
+        up_axis(up)
+    return up or "y"
+
+
+def mesh_files(path: str | os.PathLike[str]) -> list[Path]:
     """The files of meshes that a scene file names, none of which is read. Raises ``SceneError`` for what is no TOML."""
     path = _scene_path(path)
     if path.suffix.lower() in MESH_SUFFIXES:
@@ -287,6 +539,8 @@ def _table(path: Path) -> dict[str, Any]:
     """The content of a scene file."""
     try:
         return tomllib.loads(read_whole(path).decode("utf-8-sig"))
+    except FileNotFoundError as error:
+        raise NoSuchSceneError(f"{path}: cannot be read: {error.strerror}") from None
     except OSError as error:
         raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
     except (ValueError, RecursionError) as error:  # not only TOML's: bad UTF-8, too many digits
@@ -299,8 +553,8 @@ def _mesh_entries(table: dict[str, Any]) -> list[dict[str, Any]]:
     return [entry for entry in entries or [] if isinstance(entry, dict) and isinstance(entry.get("mesh"), str)]
 
 
-def write_scene(mesh_file: str | Path, path: str | Path) -> None:
-    """Write the scene that ``load_scene(mesh_file)`` gives as a scene file, to be changed at will.
+def write_scene(mesh_file: str | Path, path: str | Path, up: str | None = None) -> None:
+    """Write the scene that ``load_scene(mesh_file, up=up)`` gives as a scene file, to be changed at will.
 
     Raises ``ValueError`` unless ``path`` is that of a .toml file, and leads to no other kind.
     """
@@ -313,7 +567,7 @@ def write_scene(mesh_file: str | Path, path: str | Path) -> None:
     inside = os.path.relpath(mesh_file.resolve(), path.parent.resolve())
     is_text = inside.encode(errors="replace").decode() == inside
     expect(is_text, "mesh", "a name in UTF-8, as TOML has no other", ascii(inside))
-    text = showcase_text(load_mesh(mesh_file), Path(inside).as_posix())
+    text = showcase_text(load_mesh(mesh_file), Path(inside).as_posix(), _up_of_mesh(up))
     write_atomically(path, lambda file: file.write(text.encode()))
 
 
@@ -330,7 +584,16 @@ def _checked(table: dict[str, Any], path: Path) -> Scene:
             _ = scene.instances
     except MeshError as error:
         raise SceneError(f"{path}: objects: {' '.join(str(error).split())}") from None
+    warn_of_slips(scene.camera, scene.materials, f"{path}: ")
     return scene
+
+
+def warn_of_slips(camera: Camera | None, materials: Mapping[str, Material], where: str) -> None:
+    """Warn with ``SceneWarning`` of values of tables that are probably slips; ``where`` begins the message."""
+    tables = {"camera": camera, **{f"materials.{name}": material for name, material in materials.items()}}
+    for key, table in tables.items():
+        for slip in table._slips() if table else ():
+            warnings.warn(f"{where}{key}.{slip}", SceneWarning, stacklevel=4)
 
 
 def _loaded(mesh: Path | Mesh) -> Mesh:
@@ -351,24 +614,27 @@ def _rotation(axis: int, degrees: float) -> NDArray[np.float64]:
     return result
 
 
-def _floor_meshes(floor: Floor) -> list[tuple[Mesh, str]]:
+def _floor_meshes(floor: Floor, up: int) -> list[tuple[Mesh, str]]:
     """The floor's squares as one mesh per material, facing up, with the squares' edges shared exactly."""
-    nx, nz = floor.squares
-    x = np.linspace(floor.min[0], floor.max[0], nx + 1)
-    z = np.linspace(floor.min[1], floor.max[1], nz + 1)
-    grid_z, grid_x = np.meshgrid(z, x, indexing="ij")
-    vertices = np.stack([grid_x, np.zeros_like(grid_x), grid_z], axis=-1).reshape(-1, 3)
-    row, column = (a.ravel() for a in np.meshgrid(np.arange(nz), np.arange(nx), indexing="ij"))
-    a = row * (nx + 1) + column
-    b, c, d = a + nx + 1, a + nx + 2, a + 1
-    faces = np.stack([np.stack([a, b, c], 1), np.stack([a, c, d], 1)], 1)
+    first, second = (axis for axis in range(3) if axis != up)
+    columns, rows = floor.squares
+    a = np.linspace(floor.min[0], floor.max[0], columns + 1)
+    b = np.linspace(floor.min[1], floor.max[1], rows + 1)
+    vertices = np.zeros((rows + 1, columns + 1, 3))
+    vertices[..., first], vertices[..., second] = a, b[:, None]
+    row, column = (index.ravel() for index in np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij"))
+    corner = row * (columns + 1) + column
+    beside, across, above = corner + columns + 1, corner + columns + 2, corner + 1
+    faces = np.stack([np.stack([corner, beside, across], 1), np.stack([corner, across, above], 1)], 1)
+    if up != 1:  # x, y and y, z are in the order of a right hand, x, z are not
+        faces = faces[..., ::-1]
     # rule: floor-colour
     color = (row + column) % len(floor.materials)
     meshes = []
     for index, name in enumerate(floor.materials):
         chosen = faces[color == index].reshape(-1, 3)
         if len(chosen):
-            meshes.append((Mesh(vertices, chosen.astype(np.int32), name="floor"), name))
+            meshes.append((Mesh(vertices.reshape(-1, 3), chosen.astype(np.int32), name="floor"), name))
     return meshes
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from renderer.arguments.up import UP_AXES, turn_to
 from renderer.mesh.mesh import Mesh
 
 # The ball around the mesh, seen from a little above and to the right, fills the picture's height less a tenth.
@@ -14,19 +15,25 @@ _TOWARDS_EYE, _FOV, _MARGIN = (0.5, 0.4, 1.0), 40.0, 1.1
 _FLOOR, _SQUARES = 4.0, 16
 
 
-def showcase_text(mesh: Mesh, path: str) -> str:
+def showcase_text(mesh: Mesh, path: str, up: str) -> str:
     """The scene file, as TOML, that shows ``mesh``; ``path`` is that of its file, as the scene file names it.
 
-    The mesh is moved so that it stands in the middle of the floor, y up. It is smooth where its file has normals.
+    The mesh is moved so that it stands in the middle of the floor; ``up`` is the axis that points up. It is smooth
+    where its file has normals.
     """
     lower, upper = mesh.bounds
     radius = float(np.linalg.norm(mesh.extent)) / 2.0 or 1.0
-    middle, target = (lower + upper) / 2.0, np.array([0.0, float(mesh.extent[1]) / 2.0, 0.0])
-    towards = np.array(_TOWARDS_EYE) / np.linalg.norm(_TOWARDS_EYE)
+    axis, turn, target = UP_AXES[up], turn_to(up), np.zeros(3)
+    target[axis] = float(mesh.extent[axis]) / 2.0
+    moved = -(lower + upper) / 2.0
+    moved[axis] = -lower[axis]
+    towards = turn @ _TOWARDS_EYE / np.linalg.norm(_TOWARDS_EYE)
     eye = target + towards * (_MARGIN * radius / math.sin(math.radians(_FOV) / 2.0))
     half = _FLOOR * radius
     quoted = json.dumps(path).replace("\x7f", "\\u007f")  # as TOML has it
     return f"""# Made for {quoted}: change what you like.
+
+up = "{up}"
 
 [camera]
 eye = {_list(eye)}
@@ -37,7 +44,7 @@ fov = {_FOV}
 mesh = {quoted}
 material = "model"
 normals = "{"flat" if mesh.normals is None else "smooth"}"
-translate = {_list((-middle[0], -lower[1], -middle[2]))}
+translate = {_list(moved)}
 
 [floor]
 min = {_list((-half, -half))}
@@ -58,12 +65,12 @@ diffuse = 0.6
 
 [[lights]]
 type = "directional"
-direction = [-0.6, -1.0, -0.5]
+direction = {_list(turn @ (-0.6, -1.0, -0.5))}
 irradiance = 0.75
 
 [[lights]]
 type = "directional"
-direction = [1.0, -0.6, -0.8]
+direction = {_list(turn @ (1.0, -0.6, -0.8))}
 irradiance = 0.25
 """
 

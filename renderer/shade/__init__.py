@@ -1,1 +1,1 @@
-"""Light in kernels: a scene as records, the surface that a ray met, direct light, Whitted's recursion."""
+"""Shading in kernels: the scene as records, hit surfaces, direct light, Whitted's recursion."""

@@ -1,4 +1,4 @@
-"""Rays of neighbouring pixels that bounce together: up to 64, so that they can be traced as packets or streams."""
+"""Bundles of up to 64 rays of neighbouring pixels with the same number of bounces, traced together."""
 
 from typing import Any, NamedTuple
 
@@ -19,7 +19,7 @@ _PIXEL, _COUNT, BUNDLE_INTEGERS = 2, 2 + SIZE, 2 + 2 * SIZE
 
 
 class Bundle(NamedTuple):
-    """Pointers to one bundle's columns, and the most media that a ray remembers."""
+    """Pointers to one bundle's columns, and the largest number of media of a ray."""
 
     origins: Any
     directions: Any
@@ -66,7 +66,7 @@ def depth_of(bundle):
 
 @inlined
 def append(bundle, o, d, weight, pixel, media, count):
-    """Add a ray that is in the first ``count`` of ``media``; returns its row of starts, which is to be written."""
+    """Add a ray inside the first ``count`` of ``media``. Returns its row of starts, to be written."""
     i = load(bundle.header, 0)
     store(bundle.header, 0, i + 1)
     for k in range(3):

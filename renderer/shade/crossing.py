@@ -1,7 +1,7 @@
-"""Where a ray crosses the surface: faces that coincide there are crossed together, with no air between bodies.
+"""Crosses coinciding faces together, so that there is no air between bodies that touch.
 
-The ray goes from the medium before all of them to the medium after all; an opaque one among them stops it. Where media
-overlap, the body that the ray entered last holds; of bodies entered at one place, the one that is later in the scene.
+The ray goes from the medium before all of them to the medium after all; an opaque face among them stops it. Where media
+overlap, the body entered last counts; for bodies entered at one place, the one later in the scene.
 """
 
 from typing import Any, NamedTuple
@@ -25,8 +25,8 @@ _ENTERED, _LEFT = 1, 2
 
 
 class Together(NamedTuple):
-    """Faces that a ray crosses at one point: what it sees of them, where rays leave them back and onwards, and how many
-    are marked, 0 where one face alone is met.
+    """Faces that a ray crosses at one point: what it sees of them, where rays leave them backwards and onwards, and how
+    many are marked, 0 for a single face.
     """
 
     seen: Spot
@@ -36,8 +36,8 @@ class Together(NamedTuple):
 
 
 class Media(NamedTuple):
-    """Media that a ray is in: a pointer to the rows of their materials, outermost first, their number, and the most
-    that it remembers.
+    """The media of a ray: a pointer to the rows of their materials, outermost first, their number, and the largest
+    number.
     """
 
     rows: Any
@@ -55,25 +55,25 @@ class Change(NamedTuple):
 
 @inlined
 def came_from(n_g, d):
-    """The side of a face that a ray of direction d comes from, 1 for that of its normal or -1."""
+    """The side of a face from which a ray of direction d comes: 1 for that of its normal, or -1."""
     return -1.0 if dot(d, n_g) > 0.0 else 1.0
 
 
 @inlined
 def place_at(spot, surface, d):
-    """The ``Place`` for rays that leave the ``Surface`` at a spot, which a ray of direction d met."""
+    """The ``Place`` of rays that leave the ``Surface`` at a spot hit by a ray of direction d."""
     return Place(float(spot.face), spot.u, spot.v, surface.slack, came_from(surface.n_g, d))
 
 
 @inlined
 def may_coincide(scene, face):
-    """Whether a face may coincide with another, of which one passes light."""
+    """Whether a face may coincide with another, one of which transmits light."""
     return scene.has_touching and load(scene.touching, face) != 0
 
 
 @inlined
 def faces_together(tree, scene, spot, d, stack, memory):
-    """The faces that a ray of direction d meets at a ``Spot``. ``stack`` and ``memory`` as for ``search.depart``: the
+    """The faces that a ray of direction d hits at a ``Spot``. ``stack`` and ``memory`` as for ``search.depart``; the
     marks there last until the next search.
     """
     if may_coincide(scene, spot.face):
@@ -104,7 +104,7 @@ def _faces_together(tree, scene, spot, d, stack, memory):
 
 @inlined
 def look_together(scene, together, d):
-    """The ``Look`` of a ray of direction d: that of the face which it sees, at the place where rays leave back."""
+    """The ``Look`` of a ray of direction d: that of the face that it sees, at the place where rays leave backwards."""
     seen, near = together.seen, together.near
     look = look_at(scene, seen.face, seen.u, seen.v, d)
     if near.face == seen.face:
@@ -120,7 +120,7 @@ def _material_of(scene, holders, k):
 
 @inlined
 def _enter(media, count, material, most):
-    """Add a medium to ``media`` in place, unless there are ``most``; returns their number."""
+    """Add a medium to ``media`` in place, unless there are ``most``. Returns their number."""
     if count < most:
         store(media, count, np.int64(material))
         count += 1
@@ -129,8 +129,8 @@ def _enter(media, count, material, most):
 
 @kernel
 def _leave(media, count, material):
-    """Take the innermost entry of a medium out of ``media`` in place, wherever it stands, so that overlapping bodies
-    are left one by one; returns their number, which is the same where there is none.
+    """Remove the innermost entry of a medium from ``media`` in place, so that overlapping bodies are left one by one.
+    Returns their number, unchanged if there is none.
     """
     # rule: innermost-entry
     for k in range(count - 1, -1, -1):
@@ -148,8 +148,8 @@ def _innermost_ior(scene, media, count):
 
 @inlined
 def cross(scene, together, m, inside, media, beyond, memory):
-    """The ``Change`` of a ray in ``media`` that crosses what it met, whose media beyond go to ``beyond``, with SPARE
-    more room than the ray remembers. One face alone is of material ``m``, and met from ``inside`` or not.
+    """The ``Change`` of a ray in ``media`` that crosses the surface it hit. The media beyond go to ``beyond``, which
+    has room for SPARE more. A single face has material ``m`` and is hit from ``inside`` or not.
 
     A ninth medium is not remembered: leaving it then leads back into the eighth.
     """
@@ -169,8 +169,8 @@ def cross(scene, together, m, inside, media, beyond, memory):
 
 @kernel
 def _cross_all(scene, members, media, beyond, memory):
-    """``cross`` of all members: bodies are entered, lower faces first, before others are left, so that a sheet that is
-    entered and left at once changes nothing.
+    """``cross`` for all members: bodies are entered, lower faces first, before others are left, so that a sheet entered
+    and left at once changes nothing.
     """
     # rule: medium-of-crossing
     holders, count, n1 = make_holders(memory), media.count, _innermost_ior(scene, media.rows, media.count)
@@ -200,6 +200,6 @@ def change_of(arrays, together, m, inside, media, beyond, memory):
 
 @kernel
 def surface_together_of(arrays, together, d):
-    """The ``Surface`` that a ray of direction d meets, for Python."""
+    """The ``Surface`` that a ray of direction d hits, for Python."""
     scene, near = scene_pointers(arrays), together.near
     return left_from(scene, near.face, near.u, near.v, look_together(scene, together, d))

@@ -1,4 +1,4 @@
-"""Light that comes straight from the lights to the surfaces of a bundle: Phong with shadows.
+"""Direct light on the surfaces of a bundle: Phong with shadows.
 
 k_a I_a + sum over lights V [k_d (N.L)+ + k_s (R.V)+^n] I_light
 """
@@ -17,7 +17,7 @@ from renderer.trace.spawn import Facet, Place, put_start
 from renderer.trace.starts.record import ROW, StartPointers
 from renderer.trace.traverse import trace_rays
 
-# The surface that a ray of a bundle met, for its light and the rays that it spawns: SURFACE_DOUBLES float64 per ray.
+# The surface that a ray of a bundle hit, for its light and the rays that it spawns: SURFACE_DOUBLES float64 per ray.
 # GEOMETRIC is the first of the ``Facet``. Where light passes, CHANGE has the ``crossing.Change``, and LAST the
 # ``level.Spot`` that a refracted ray leaves.
 POINT, NORMAL, GEOMETRIC, BOUND, MATERIAL, INSIDE, LIGHT, PLACE, CHANGE, LAST = 0, 3, 6, 11, 12, 13, 14, 17, 22, 25
@@ -37,7 +37,7 @@ def place_of(surface):
 
 @inlined
 def put_place(surface, spot, came):
-    """Write the ``Place`` of a surface but for the slack, which ``put_bounds`` writes."""
+    """Write the ``Place`` of a surface without the slack, which ``put_bounds`` writes."""
     row = offset(surface, PLACE)
     put3(row, 0, (float(spot.face), spot.u, spot.v))
     store(row, 4, came)
@@ -63,7 +63,7 @@ def put_bounds(scene, surface):
 
 @inlined
 def is_lit(materials, m):
-    """Whether the material in row ``m`` shows direct light."""
+    """Whether the material in row ``m`` reflects direct light."""
     kind = load(materials, m + KIND)
     return kind != MIRROR and kind != DIELECTRIC and kind != UNLIT
 
@@ -72,7 +72,7 @@ def is_lit(materials, m):
 def _aim_all(scene, bundle, surfaces, lit, count, light, rule, shadows):
     """Aim shadow rays from the surfaces of the ``count`` rays in ``lit`` at a light.
 
-    Returns the number of surfaces that face it; their rays go to ``lit`` from SIZE on.
+    Returns the number of surfaces that face it; their rays are written to ``lit`` from SIZE on.
     """
     aimed = 0
     for k in range(count):
@@ -101,7 +101,7 @@ def _aim_all(scene, bundle, surfaces, lit, count, light, rule, shadows):
 
 @inlined
 def _add_light(scene, bundle, surface, i, towards, arriving):
-    """Add the share of a light that reaches the surface of ray ``i`` and is sent back along the ray."""
+    """Add the share of a light that reaches the surface of ray ``i`` and is reflected back along the ray."""
     m, n, d = np.int64(load(surface, MATERIAL)), three(surface, NORMAL), row3(bundle.directions, i)
     factor = phong(scene, m, n, d, towards)
     put3(surface, LIGHT, add(three(surface, LIGHT), times(factor, arriving)))
@@ -124,10 +124,10 @@ def _trace_shadows(tree, scene, bundle, lit, aimed, scratch):
 
 @kernel
 def light_surfaces(tree, scene, bundle, surfaces, lit, settings, scratch):
-    """Direct light of the surfaces that a bundle met, into their LIGHT.
+    """Write the direct light on the surfaces of a bundle to their LIGHT.
 
-    ``lit`` holds the number of rays whose material shows direct light, then these rays, and room for as many again.
-    Shadow rays are counted in ``scratch.traced`` of their pixels; without ``settings.shadows`` there are none.
+    ``lit`` has the number of rays whose material reflects direct light, these rays, and room for as many again. Shadow
+    rays are counted in ``scratch.traced`` of their pixels; without ``settings.shadows`` there are none.
     """
     count, lit = load(lit, 0), offset(lit, 1)
     shadows = scratch.shadows

@@ -1,4 +1,4 @@
-"""One colour per face: Phong at its centroid, without shadows and without bounces, as codes of sRGB."""
+"""One colour for each face, as sRGB codes: Phong at its centroid, without shadows and bounces."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ PLACES = 4096
 
 @inlined
 def _encoded(x, steps, first):
-    """The sRGB code of x, found from the code at the beginning of its part of [0, 1]; see ``face_phong.CodeTable``."""
+    """The sRGB code of x, found from the code at the start of its part of [0, 1]; see ``face_phong.CodeTable``."""
     x = minimum(maximum(x, 0.0), 1.0)
     code = load(first, np.int64(x * PLACES))
     while load(steps, code) <= x:

@@ -1,4 +1,4 @@
-"""A light as a surface sees it, and the shadow ray towards it."""
+"""Lights as seen from a surface, and shadow rays."""
 
 from typing import NamedTuple
 
@@ -35,9 +35,7 @@ class SeenLight(NamedTuple):
 
 @inlined
 def see_light(lights, light, p, n, error):
-    """The ``SeenLight`` from the surface point p, whose normal is n and whose distance from its plane is bounded by
-    ``error``.
-    """
+    """The ``SeenLight`` from the surface point p with normal n; ``error`` bounds its distance from its plane."""
     row = light * LIGHT_COLUMNS
     place, arriving = three(lights, row + 1), three(lights, row + 4)
     if load(lights, row) == DIRECTIONAL:
@@ -53,7 +51,7 @@ def see_light(lights, light, p, n, error):
 
 
 class ShadowRay(NamedTuple):
-    """A ray from a surface towards a light that it faces; t counts in units of ``direction``."""
+    """A shadow ray from a surface to a light that it faces; t counts in units of ``direction``."""
 
     origin: tuple
     direction: tuple
@@ -62,7 +60,7 @@ class ShadowRay(NamedTuple):
 
 @inlined
 def aim(seen, p, n_g, error, offset):
-    """The ``ShadowRay`` from the surface point p to a light that was seen from there.
+    """The ``ShadowRay`` from the surface point p to a ``SeenLight``.
 
     A shadow ray to a point light ends just before the light, so that a surface at the light does not hide it. Its t
     counts in units of the distance.
@@ -77,6 +75,6 @@ def aim(seen, p, n_g, error, offset):
 
 @kernel
 def aim_from(arrays, surface, n, light, offset):
-    """For Python: a light as a ``Surface`` with the normal n sees it, and the shadow ray by an offset rule."""
+    """For Python: a ``SeenLight`` from a ``Surface`` with normal n, and the shadow ray by an offset rule."""
     seen = see_light(scene_pointers(arrays).lights, light, surface.p, n, surface.error)
     return seen, aim(seen, surface.p, surface.n_g, surface.error, offset)

@@ -1,4 +1,4 @@
-"""Columns of the arrays of materials and lights, which ``scene.material`` and ``scene.light`` write for kernels."""
+"""Columns of the arrays of materials and lights; ``scene.material`` and ``scene.light`` write them."""
 
 # One row per material, float64. Colours take three columns from the one named.
 KIND, AMBIENT, DIFFUSE, SPECULAR, REFLECTANCE, TRANSMITTANCE = 0, 1, 4, 7, 10, 13

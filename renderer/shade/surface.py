@@ -1,4 +1,4 @@
-"""A scene as kernels read it: its arrays, the surface where a ray met it, and the share of light that this sends on."""
+"""A scene as kernels read it, the surface at a hit, and the light that it reflects."""
 
 from typing import Any, NamedTuple
 
@@ -18,18 +18,18 @@ MAX_MEDIA = 8
 
 
 class SceneArrays(NamedTuple):
-    """The arrays that kernels read of a scene; the columns of materials and lights are those of ``records``.
+    """The arrays of a scene; the columns of materials and lights are those of ``records``.
 
     vertices   (V, 3)
-    normals    (V, 3), without rows where no face is smooth
+    normals    (V, 3), no rows if no face is smooth
     faces      (F, 3) int32
-    material   (F,) int32, for each face the place in ``materials``, as a flat array, at which its material's row begins
-    smooth     (F,) bool, without rows where no face is smooth
+    material   (F,) int32, for each face the start of its material's row in the flat array ``materials``
+    smooth     (F,) bool, no rows if no face is smooth
     materials  (M, MATERIAL_COLUMNS)
     lights     (L, LIGHT_COLUMNS)
     colors     (2, 3), ambient and background
     media      (m,) int64, m <= MAX_MEDIA, the same place for each medium that the eye is in, outermost first
-    touching   (F,) uint8, not 0 for faces that may coincide with one that passes light; without rows where none does
+    touching   (F,) uint8, not 0 for faces that may coincide with one that transmits light; no rows if none does
     """
 
     vertices: NDArray[np.float64]
@@ -45,8 +45,8 @@ class SceneArrays(NamedTuple):
 
 
 class ScenePointers(NamedTuple):
-    """A ``SceneArrays`` as the kernels read it: pointers, the numbers of lights and of media around the eye, and
-    whether any face is smooth, and whether any touches another.
+    """A ``SceneArrays`` as pointers, with the numbers of lights and of media around the eye, and whether any face is
+    smooth and any touches another.
     """
 
     vertices: Any
@@ -87,9 +87,7 @@ def scene_pointers(scene):
 
 
 class Look(NamedTuple):
-    """What a ray sees of the scene: its point p, the ``Facet`` that it met, the shading normal, and the place at which
-    the material's row begins.
-    """
+    """What a ray sees at a hit: the point p, the ``Facet``, the shading normal, and the start of the material's row."""
 
     p: tuple
     facet: Facet
@@ -98,8 +96,8 @@ class Look(NamedTuple):
 
 
 class Surface(NamedTuple):
-    """The surface where a ray met the scene, for rays that leave it: a ``Look``'s point p, the ``offset_distance`` of
-    p, the geometric and the shading normal and the material; and the slack of rays from there.
+    """A hit surface, for rays that leave it: the point p of a ``Look``, the ``offset_distance`` of p, the geometric and
+    the shading normal, the material, and the slack of rays from there.
     """
 
     p: tuple
@@ -112,7 +110,7 @@ class Surface(NamedTuple):
 
 @inlined
 def look_at(scene, face, u, v, d):
-    """The ``Look`` at barycentrics u, v of a face that a ray of direction d met."""
+    """The ``Look`` at barycentrics u, v of a face hit by a ray of direction d."""
     a, b, c = row3(scene.faces, face)
     p0, p1, p2 = row3(scene.vertices, a), row3(scene.vertices, b), row3(scene.vertices, c)
     facet = facet_of(p0, p1, p2, d)
@@ -134,21 +132,21 @@ def bounds_at(scene, face, u, v, p, facet):
 
 @inlined
 def left_from(scene, face, u, v, look):
-    """The ``Surface`` of a ``Look`` which rays leave from a face at barycentrics u, v."""
+    """The ``Surface`` of a ``Look`` at barycentrics u, v of a face."""
     error, slack = bounds_at(scene, face, u, v, look.p, look.facet)
     return Surface(look.p, error, look.facet.normal, look.n_s, look.material, slack)
 
 
 @inlined
 def surface_at(scene, face, u, v, d):
-    """The ``Surface`` at barycentrics u, v of a face that a ray of direction d met."""
+    """The ``Surface`` at barycentrics u, v of a face hit by a ray of direction d."""
     return left_from(scene, face, u, v, look_at(scene, face, u, v, d))
 
 
 @inlined
 def phong(scene, m, n, d, towards):
-    """The share of light from the unit direction ``towards`` that the material in row ``m`` sends against d:
-    k_d N.L + k_s (R.V)^n, for N.L >= 0.
+    """The share of light from the unit direction ``towards`` that the material in row ``m`` reflects against d: k_d N.L
+    + k_s (R.V)^n, for N.L >= 0.
     """
     factor = scale(three(scene.materials, m + DIFFUSE), dot(n, towards))
     if load(scene.materials, m + KIND) == PHONG:
@@ -159,7 +157,7 @@ def phong(scene, m, n, d, towards):
 
 @inlined
 def lets_through(materials, m):
-    """Whether light goes through a surface of the material in row ``m``."""
+    """Whether the material in row ``m`` transmits light."""
     return largest_component(three(materials, m + TRANSMITTANCE)) > 0.0
 
 

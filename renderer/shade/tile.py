@@ -1,7 +1,7 @@
 """A tile of the picture: camera rays in blocks of 8 x 8 pixels, one bundle per sample, and the sums of their light.
 
-Depth, normal and face are those of the rays through the pixels' centres. Where no sample is there, and one of them is
-kept, a bundle more is traced for them, which is not lit and not counted.
+Depth, normal and face are those of rays through the pixels' centres. If one of them is kept and no sample is at the
+centre, an extra bundle is traced for them, neither lit nor counted.
 """
 
 from typing import Any, NamedTuple
@@ -37,7 +37,7 @@ _SQUARE = 4
 
 class Film(NamedTuple):
     """The arrays that tiles are written to: radiance and normal (h, w, 3), depth, face and rays (h, w). Radiance is
-    always kept; of an array that is not kept, h and w are 0.
+    always kept; h and w are 0 for arrays that are not.
     """
 
     radiance: NDArray[np.float32]
@@ -48,7 +48,7 @@ class Film(NamedTuple):
 
 
 class Rectangle(NamedTuple):
-    """A rectangle of pixels: columns from x0 up to, but not, x1, rows from y0 to y1."""
+    """A rectangle of pixels: columns x0 to x1 and rows y0 to y1, the last ones excluded."""
 
     x0: int
     y0: int
@@ -66,7 +66,7 @@ class CameraMap(NamedTuple):
 
 @inlined
 def _place(k):
-    """Column and row in a block of its k-th pixel: square by square, so that the pixels of a packet are a square."""
+    """Column and row of a block's k-th pixel: square by square, so that a packet covers a square."""
     square, rest = k // (_SQUARE * _SQUARE), k % (_SQUARE * _SQUARE)
     across = SIDE // _SQUARE
     return square % across * _SQUARE + rest % _SQUARE, square // across * _SQUARE + rest // _SQUARE
@@ -74,8 +74,8 @@ def _place(k):
 
 @inlined
 def _shoot(camera, scene, bundle, across, down, block):
-    """Fill a bundle with the camera rays of a block, all through the same place in a pixel: ``across`` and ``down``
-    from its corner.
+    """Fill a bundle with the camera rays of a block, all through one place in their pixels: ``across`` and ``down``
+    from the corner.
 
     Pixels count row by row, SIDE per row.
     """
@@ -95,7 +95,7 @@ def _shoot(camera, scene, bundle, across, down, block):
 
 @inlined
 def _write_first_hits(film, bundle, scratch, block):
-    """Write depth, face and shading normal of the camera rays of a block that were just traced."""
+    """Write depth, face and shading normal of the camera rays just traced for a block."""
     for i in range(count_of(bundle)):
         pixel, surface = load(bundle.pixels, i), offset(scratch.surfaces, i * SURFACE_DOUBLES)
         x, y, face = block.x0 + pixel % SIDE, block.y0 + pixel // SIDE, load(scratch.found.face, i)
@@ -112,14 +112,14 @@ def _write_first_hits(film, bundle, scratch, block):
 
 @inlined
 def _has_centre(count):
-    """Whether one of so many samples, the middle one, is at the pixel's centre: those of a grid with odd sides."""
+    """Whether one of so many samples, the middle one, is at the pixel's centre: true for grids with odd sides."""
     return count % 2 == 1
 
 
 @kernel
 def _look(tree, scene, settings, camera, film, scratch, block):
-    """Write the first hits of rays through the pixels' centres, none of which is a sample. Colours, counts of rays and
-    surfaces in ``scratch`` are overwritten.
+    """Write the first hits of extra rays through the pixels' centres. Colours, ray counts and surfaces in ``scratch``
+    are overwritten.
     """
     bundle = slot(scratch, settings, 0)
     _shoot(camera, scene, bundle, 0.5, 0.5, block)
@@ -145,7 +145,7 @@ def _end_sample(film, block, scratch, total):
 
 @kernel
 def _end_block(film, block, scratch, total, count):
-    """Write the radiance of a block. Returns the number of its pixels that were cut by ``max_rays``."""
+    """Write the radiance of a block. Returns the number of pixels cut by ``max_rays``."""
     cut = 0
     for y in range(block.y0, block.y1):
         for x in range(block.x0, block.x1):
@@ -179,7 +179,7 @@ _BLOCK, _BEGUN, _WAITING, _FROM_CAMERA, CUT, _STATE = range(6)
 
 @kernel
 def _next_sample(tree, scene, settings, camera, film, tile, scratch, total, state):
-    """End the sample under way and begin the next one, in the next block after the last sample of a block. Returns
+    """End the current sample and begin the next one, in the next block after the last sample of a block. Returns
     whether there is one.
     """
     block, begun = _block_of(tile, load(state, _BLOCK)), load(state, _BEGUN)
@@ -207,8 +207,8 @@ def _next_sample(tree, scene, settings, camera, film, tile, scratch, total, stat
 
 
 class TileScratch(NamedTuple):
-    """Scratch to render a tile: for tracing, for its ``BundleScratch``, for the sums of a block and for its progress;
-    and the number of bundles that are traced per call.
+    """Scratch for a tile: for tracing, for its ``BundleScratch``, for the sums of a block and for its progress; and the
+    number of bundles traced in a call.
     """
 
     trace: Scratch
@@ -221,7 +221,7 @@ class TileScratch(NamedTuple):
 
 
 def tile_scratch(depth: int, settings: Settings, bundles: int = 1 << 62) -> TileScratch:
-    """The scratch that ``render_tile`` needs beside its film, for one tile and a tree of ``depth`` levels."""
+    """The scratch of ``render_tile`` for one tile and a tree of ``depth`` levels."""
     doubles, integers = scratch_lengths(settings)
     trace, hits = new_scratch(depth, SIZE), np.empty(SIZE, np.bool_)
     return TileScratch(
@@ -232,7 +232,7 @@ def tile_scratch(depth: int, settings: Settings, bundles: int = 1 << 62) -> Tile
 
 @inlined
 def _trace_next(tree, scene, settings, camera, film, tile, scratch, state):
-    """Trace the bundle that was spawned last, and spawn its bundles."""
+    """Trace the bundle spawned last, and spawn its bundles."""
     top = load(state, _WAITING) - 1
     bundle = slot(scratch, settings, top)
     trace_bundle(tree, scene, settings, bundle, scratch)
@@ -248,8 +248,8 @@ def render_tile(descriptor, scene, settings, camera, samples, film, tile, arrays
     """Fill the pixels of a ``Rectangle``, the tile; ``camera`` are the rows of the camera's affine map.
 
     ``descriptor`` is the tree's. Depth, face and normal are those of the pixel's centre, radiance is the mean of the
-    samples, their rays are added up from 0. Returns whether the tile is done. If not, ``arrays.bundles`` bundles were
-    traced, and the caller can react to Ctrl-C; called again with the same ``arrays``, a ``TileScratch``, it goes on.
+    samples, and rays are summed. Returns whether the tile is done. If not, ``arrays.bundles`` bundles were traced and
+    the caller can react to Ctrl-C; the next call with the same ``arrays``, a ``TileScratch``, continues.
     """
     doubles, integers, hits = pointer(arrays.doubles), pointer(arrays.integers), pointer(arrays.hits)
     state, total = pointer(arrays.state), pointer(arrays.total)

@@ -1,6 +1,6 @@
-"""The faces that may coincide with one that passes light: where rays meet them, kernels look which they meet there.
+"""Marks the faces that may coincide with one that transmits light; kernels look closer only at those.
 
-Found once for a scene. Too many cost time alone.
+They are found once for a scene. Marking too many costs only time.
 """
 
 from typing import Any, NamedTuple
@@ -36,8 +36,8 @@ _EDGE_ERROR = 2.0**-50
 
 @kernel
 def mark_touching(descriptor, arrays, begin, end, every, stack, touching):
-    """Mark those faces of some places in blocks that pass light, or every one, and may coincide with another face; and
-    that one.
+    """Mark the faces in some places of blocks that transmit light, or all, and that may coincide with another face;
+    mark that face too.
     """
     tree, scene = tree_pointers(descriptor), scene_pointers(arrays)
     for slot in range(begin, end):
@@ -91,7 +91,7 @@ def _box_of(flat):
 
 
 class _Query(NamedTuple):
-    """A face whose company is looked for: its ``_Flat``, its number, the corners of its box grown by its room, and a
+    """The search for faces that coincide with one: its ``_Flat``, its number, the corners of its grown box, and a
     pointer to the marks.
     """
 
@@ -117,7 +117,7 @@ def _enter(tree, query, node, found):
 
 @inlined
 def _mark_touched_in(tree, query, first, blocks, found):
-    """Mark the face and those of some blocks that may coincide with it; the search goes on."""
+    """Mark the face and the faces of some blocks that may coincide with it; the search continues."""
     for block in range(first, first + blocks):
         bits = _level_bits(tree, block * BLOCK_WORDS, query.flat)
         while bits != 0:
@@ -138,7 +138,7 @@ def _coordinates(tree, at_):
 
 @inlined
 def _level_bits(tree, base, flat):
-    """The bits of the faces of a block that are in the plane of a face, or nearly so."""
+    """The bits of the faces of a block that lie in the plane of a face, or nearly so."""
     p, n, bits = flat.corners[0], flat.normal, np.int64(0xF)
     for k in range(3):
         x = _coordinates(tree, base + 12 * k) - splat4(p[0])
@@ -154,7 +154,7 @@ def _level_bits(tree, base, flat):
 
 @kernel
 def _may_coincide(flat, q):
-    """Whether a face in a plane with another one meets its box, and no side of one has all of the other beyond it."""
+    """Whether a face in the plane of another overlaps its box, and no side of either separates them."""
     p, (x, y, z) = flat.corners, flat.normal
     for k in range(3):
         (low, high), (least, most) = _range(p, k), _range(q, k)
@@ -173,14 +173,14 @@ def _flat(a, axis):
 
 @kernel
 def _turn(a, b, c, axis):
-    """Twice the area of a triangle as seen along an axis, and what rounding may have made of it."""
+    """Twice the area of a triangle seen along an axis, and the bound of its rounding."""
     (x, y), (s, t) = _flat(sub(b, a), axis), _flat(sub(c, a), axis)
     return x * t - y * s, _EDGE_ERROR * (abs(x * t) + abs(y * s))
 
 
 @kernel
 def _has_beyond(p, q, axis):
-    """Whether a face has a side beyond which all of the other one is."""
+    """Whether a face has a side with all of the other face beyond it."""
     around = _turn(p[0], p[1], p[2], axis)[0]
     for k in range(3):
         a, b = (p[0], p[1]) if k == 0 else ((p[1], p[2]) if k == 1 else (p[2], p[0]))

@@ -2,8 +2,8 @@
 
 I(x) = k_a I_a + sum over lights V [k_d (N.L)+ + k_s (R.V)+^n] I_light + k_r I(reflected) + k_t I(refracted)
 
-A bundle spawns two: one of its refracted and one of its reflected rays. The reflected one is traced first, with all
-that it spawns. So each pixel adds up its light in the order of its own recursion, whatever other pixels its bundle has.
+A bundle spawns two: its refracted and its reflected rays. The reflected one is traced first, with all that it spawns.
+So each pixel sums its light in the order of its own recursion, whatever other pixels share its bundle.
 """
 
 from typing import Any, NamedTuple
@@ -70,9 +70,9 @@ class Settings(NamedTuple):
     max_depth   the most bounces
     min_weight  the weight below which a ray ends
     offset      the offset rule of spawned rays
-    media       the most media that a ray remembers, ``surface.MAX_MEDIA``, or 0 where nothing refracts
+    media       the largest number of media of a ray, ``surface.MAX_MEDIA``, or 0 if nothing refracts
     shadows     whether surfaces hide lights
-    max_rays    the number of rays of a sample of a pixel after which no more are spawned
+    max_rays    the number of rays of a pixel's sample after which no more are spawned
     """
 
     max_depth: int
@@ -86,10 +86,9 @@ class Settings(NamedTuple):
 class BundleScratch(NamedTuple):
     """Scratch of one thread, as pointers.
 
-    The bundles and the order in which their places are used: first those that wait, then the free ones. For tracing,
-    its scratch, its hits, and a zero and an infinity as bounds. For the bundle under way, its surfaces, its shadow
-    rays, the list of its lit rays, and the media beyond the surfaces. For each pixel its colour, the number of rays
-    traced, and whether it was cut: without ``Settings.max_rays`` it would have spawned more.
+    The bundles and the order of their places: waiting ones first, then free ones. For tracing: scratch, hits, and a
+    zero and an infinity as bounds. For the current bundle: surfaces, shadow rays, the list of lit rays, and the media
+    beyond the surfaces. For each pixel: colour, number of rays traced, and whether ``Settings.max_rays`` cut it.
     """
 
     bundles: Any
@@ -109,9 +108,9 @@ class BundleScratch(NamedTuple):
 
 
 def scratch_lengths(settings: Settings) -> tuple[int, int]:
-    """Words of float64 and of int64 of the arrays behind a ``BundleScratch``, less those of ``trace``.
+    """Numbers of float64 and int64 of a ``BundleScratch``, without those of ``trace``.
 
-    At most one bundle waits per level; one more is under way, and two places are free for those that it spawns.
+    At most one bundle waits on each level; one more is current, and two places are free for those that it spawns.
     """
     slots = settings.max_depth + 4
     doubles = slots * BUNDLE_DOUBLES + 3 * SIZE + 2 + SIZE * SURFACE_DOUBLES + SHADOW_DOUBLES + 3 * SIZE
@@ -146,7 +145,7 @@ def bundle_scratch(doubles, integers, hits, settings, trace):
 
 @inlined
 def begin_bundles(scratch, settings):
-    """Set the bounds of all rays, and the order of the places at the start."""
+    """Set the bounds of all rays, and the initial order of the places."""
     store(scratch.zero, 0, 0.0)
     store(scratch.infinity, 0, np.inf)
     for slot in range(settings.max_depth + 4):
@@ -167,13 +166,13 @@ def _goes_on(weight, min_weight):
 
 @inlined
 def _beyond(scratch, limit, i):
-    """The place for the media beyond the surface that ray ``i`` met."""
+    """The place for the media beyond the surface hit by ray ``i``."""
     return offset(scratch.beyond, i * (limit + SPARE))
 
 
 @inlined
 def _put_change(scene, bundle, scratch, i, together, inside):
-    """Write how the media of ray ``i`` change where it crosses the surface that it met."""
+    """Write the change of media of ray ``i`` at the surface that it hit."""
     surface = offset(scratch.surfaces, i * SURFACE_DOUBLES)
     media = Media(offset(bundle.media, i * bundle.limit), load(bundle.media_counts, i), bundle.limit)
     m = np.int64(load(surface, MATERIAL))
@@ -185,7 +184,7 @@ def _put_change(scene, bundle, scratch, i, together, inside):
 
 @inlined
 def _put_look(scene, bundle, scratch, i, together, look):
-    """Write what ray ``i`` sees where it meets some faces together, and its ambient light, to ``scratch``."""
+    """Write what ray ``i`` sees where it hits several faces together, and its ambient light, to ``scratch``."""
     surface, d = offset(scratch.surfaces, i * SURFACE_DOUBLES), row3(bundle.directions, i)
     # The shading normal faces the eye; a surface without light from behind has two sides.
     inside = dot(d, look.n_s) > 0.0
@@ -203,7 +202,7 @@ def _put_look(scene, bundle, scratch, i, together, look):
 
 @kernel
 def _meet_together(tree, scene, bundle, scratch, i, spot):
-    """Write what ray ``i`` sees at a ``Spot`` where faces may coincide; returns its material."""
+    """Write what ray ``i`` sees at a ``Spot`` where faces may coincide. Returns its material."""
     d = row3(bundle.directions, i)
     together = faces_together(tree, scene, spot, d, scratch.trace.packet_stack, scratch.trace.holders)
     store(scratch.found.face, i, together.seen.face)
@@ -212,7 +211,7 @@ def _meet_together(tree, scene, bundle, scratch, i, spot):
 
 @inlined
 def _meet_surface(tree, scene, bundle, scratch, i):
-    """Write what ray ``i`` sees; returns its material."""
+    """Write what ray ``i`` sees. Returns its material."""
     found = scratch.found
     spot = Spot(load(found.face, i), load(found.u, i), load(found.v, i))
     if may_coincide(scene, spot.face):
@@ -223,7 +222,7 @@ def _meet_surface(tree, scene, bundle, scratch, i):
 
 @kernel
 def _meet_surfaces(tree, scene, bundle, scratch):
-    """Write the surfaces that rays met to ``scratch``, and list the lit rays; rays that met none add the background."""
+    """Write the surfaces hit by rays to ``scratch``, and list the lit rays; a miss adds the background."""
     lit = 0
     for i in range(count_of(bundle)):
         pixel = load(bundle.pixels, i)
@@ -243,8 +242,8 @@ def _meet_surfaces(tree, scene, bundle, scratch):
 
 @inlined
 def _refract(scene, m, d, n, n1, n2):
-    """The refracted ray of a ray in direction d that goes from index n1 to n2 at a surface of material ``m``, whose
-    normal n faces it: its direction, whether there is one, k_r and k_t.
+    """The refracted ray of a ray in direction d from index n1 to n2 at a surface of material ``m``, whose normal n
+    faces it: its direction, whether there is one, k_r and k_t.
     """
     materials = scene.materials
     k_r, k_t = three(materials, m + REFLECTANCE), three(materials, m + TRANSMITTANCE)
@@ -260,7 +259,7 @@ def _refract(scene, m, d, n, n1, n2):
 
 @inlined
 def passes_light(materials, m):
-    """Whether the material in row ``m`` has refracted rays, of weight 0 perhaps."""
+    """Whether the material in row ``m`` has refracted rays, perhaps of weight 0."""
     return lets_through(materials, m) or load(materials, m + KIND) == DIELECTRIC
 
 
@@ -277,7 +276,7 @@ def refract_from(arrays, m, d, n, n1, n2):
 
 
 class _Exit(NamedTuple):
-    """Where spawned rays leave a surface: its point, the ``offset_distance`` of that, its normal and its ``Place``."""
+    """Where spawned rays leave a surface: the point, its ``offset_distance``, the normal and the ``Place``."""
 
     p: tuple
     error: float
@@ -287,13 +286,13 @@ class _Exit(NamedTuple):
 
 @inlined
 def _exit_of(surface):
-    """The ``_Exit`` of rays that stay on the side of a surface from which it was met."""
+    """The ``_Exit`` of rays that stay on the side of a surface from which it was hit."""
     return _Exit(three(surface, POINT), load(surface, BOUND), three(surface, GEOMETRIC), place_of(surface))
 
 
 @inlined
 def _exit_beyond(scene, surface, d):
-    """The ``_Exit`` of a ray that goes through all the faces that a ray of direction d met together."""
+    """The ``_Exit`` of a ray that crosses all the faces that a ray of direction d hit together."""
     if np.int64(load(surface, LAST)) == np.int64(load(surface, PLACE)):
         return _exit_of(surface)
     return _exit_at(scene, offset(surface, LAST), d)
@@ -309,7 +308,7 @@ def _exit_at(scene, row, d):
 
 @inlined
 def _spawn(leaving, pixel, d, w, weight, children, media, count, settings):
-    """Add the ray in direction w from an ``_Exit``, of a ray of ``pixel`` in direction d, to ``children``."""
+    """Add to ``children`` the ray in direction w from an ``_Exit``, spawned by a ray of ``pixel`` in direction d."""
     w = normalized(w)
     o = spawn_origin(leaving.p, leaving.error, leaving.n_g, w, settings.offset)
     row = append(children, o, w, weight, pixel, media, count)
@@ -318,7 +317,7 @@ def _spawn(leaving, pixel, d, w, weight, children, media, count, settings):
 
 @inlined
 def _may_leave(scratch, pixel, weight, settings):
-    """Whether a ray of this weight is spawned. That depends on its pixel alone, not on others of its bundle."""
+    """Whether a ray of this weight is spawned; that depends on its pixel alone, not on its bundle."""
     if not _goes_on(weight, settings.min_weight):
         return False
     # rule: ray-budget
@@ -330,7 +329,7 @@ def _may_leave(scratch, pixel, weight, settings):
 
 @kernel
 def _bounce(scene, bundle, settings, scratch, refracted, reflected):
-    """Collect the refracted and the reflected rays that a bundle spawns."""
+    """Collect the refracted and reflected rays of a bundle."""
     materials = scene.materials
     for i in range(count_of(bundle)):
         if load(scratch.found.face, i) < 0:
@@ -366,7 +365,7 @@ def _collect_light(scene, bundle, scratch):
 
 @inlined
 def meet(tree, scene, bundle, scratch):
-    """Trace the rays of a bundle and write the surfaces that they meet to ``scratch``, of which none is lit yet."""
+    """Trace the rays of a bundle and write the surfaces that they hit, not yet lit, to ``scratch``."""
     # Those of camera rays are all alike: they start on no surface.
     starts = StartPointers(bundle.starts, ROW if depth_of(bundle) > 0 else 0, scene.vertices, scene.faces)
     rays = RayPointers(bundle.origins, bundle.directions, scratch.zero, scratch.infinity, 3, 3, 0, 0, 1.0, starts)
@@ -376,7 +375,7 @@ def meet(tree, scene, bundle, scratch):
 
 @kernel
 def trace_bundle(tree, scene, settings, bundle, scratch):
-    """Trace the rays of a bundle and light the surfaces that they meet; ``push_children`` spawns further rays."""
+    """Trace the rays of a bundle and light the surfaces that they hit; ``push_children`` spawns further rays."""
     meet(tree, scene, bundle, scratch)
     light_surfaces(tree, scene, bundle, scratch.surfaces, scratch.lit, settings, scratch)
     _collect_light(scene, bundle, scratch)
@@ -386,7 +385,7 @@ def trace_bundle(tree, scene, settings, bundle, scratch):
 def push_children(scene, settings, scratch, bundle, top):
     """Spawn the rays of the bundle in place ``top`` into the two free places above it. Returns the new top.
 
-    The bundle's own place is free then, and goes behind the others; an empty bundle does not wait.
+    The bundle's own place becomes free, behind the others. An empty bundle does not wait.
     """
     if depth_of(bundle) >= settings.max_depth:
         return top

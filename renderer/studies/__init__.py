@@ -1,6 +1,6 @@
-"""Light and visibility studies of any size: what each of a million points sees, in rays that are never written down.
+"""Studies of light and visibility: what each of many points sees of the sky, the sun and its surroundings.
 
-The functions are those of ``__init__.pyi``, imported when they are first used. They take an ``Octree`` first.
+Functions take an ``Octree`` first, then points, their normals and, if it is known, the face that each lies on.
 """
 
 from renderer.lazy_names import attach_stub as _attach_stub

@@ -6,9 +6,11 @@ from .directions import fibonacci_hemisphere as fibonacci_hemisphere
 from .directions import fibonacci_sphere as fibonacci_sphere
 from .directions import reinhart as reinhart
 from .directions import tregenza as tregenza
+from .grid import grid_points as grid_points
 from .hidden import occlusion as occlusion
 from .places import FacePoints as FacePoints
 from .places import face_points as face_points
+from .places import sample_points as sample_points
 from .sky import sky_view_factor as sky_view_factor
 from .sky import sun_hours as sun_hours
 from .views import Scan as Scan

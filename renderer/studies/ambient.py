@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.queryable import Queries
 from renderer.studies.directions import Pattern, check_count, cosine_hemisphere, fibonacci_sphere
-from renderer.studies.share import StudyRequest, check_request, evaluate, limits_of
+from renderer.studies.share import StudyRequest, check_reach, check_request, evaluate, limits_of
 from renderer.studies.sweep import Sky
 
 Floats = NDArray[np.float64]
@@ -20,34 +21,61 @@ def ambient_occlusion(
     normals: ArrayLike,
     *,
     samples: int = 256,
-    distance: float = np.inf,
+    max_distance: float = np.inf,
     leaving: ArrayLike | None = None,
     threads: int | None = None,
     progress: bool = False,
+    distance: float | None = None,
 ) -> Floats:
-    """The share of even light from all sides that reaches each point's plane, (...) float64: 1 in the open, 0 shut in.
+    """The share of even light from all sides that reaches the plane of each point: 1 in the open, 0 shut in.
 
-    So it is the factor that ambient light is multiplied by, 1/pi times the integral of d . n over the open directions d
-    of the hemisphere about the point's normal n. Some call 1 less this the occlusion.
+    Ambient light is multiplied by this factor. Some call 1 minus it the occlusion.
 
-    samples   directions, 1 to 2^24: those of ``directions.cosine_hemisphere``, about each point's normal. They are the
-              same for all points of one normal, so errors are smooth over a wall, not noise, and nothing is random
-    distance  how far the mesh hides, in scene units
+    Parameters
+    ----------
+    octree : Octree or BruteForce
+    points : array_like, shape (..., 3)
+    normals : array_like, shape (..., 3) or (3,)
+        As for `occlusion`, but not None.
+    samples : int, default 256
+        The number of directions, from 1 to 2^24: those of `cosine_hemisphere`, turned about each normal.
+    leaving : array_like of int, shape (...), optional
+    max_distance : float, default inf
+    threads : int, optional
+    progress : bool, default False
+        As for `occlusion`.
+    distance : float, optional
+        The former name of `max_distance`.
 
-    ``points``, ``leaving``, ``threads`` and ``progress`` as for ``occlusion``, ``normals`` too, but not None. The share
-    is a whole number of samples over all of them. Raises ``ValueError`` naming argument and row.
+    Returns
+    -------
+    ndarray of float64, shape (...)
+        1/pi times the integral of d . n over the open directions d of the hemisphere about the normal n. It is a whole
+        number of samples over `samples`.
 
+    Raises
+    ------
+    ValueError
+        If an argument is not as above.
+
+    Notes
+    -----
+    Nothing is random. All points of one normal look in the same directions, so errors over a wall are smooth.
+
+    Examples
+    --------
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box
     >>> from renderer.studies import ambient_occlusion
     >>> octree = Octree.from_mesh(box((0, -500, 0), (1, 500, 500)))
-    >>> ambient_occlusion(octree, [[9, 0, 900], [1.001, 0, 0.001]], [0, 0, 1], samples=10000).round(2)
+    >>> ambient_occlusion(octree, [[9.0, 0, 900], [1.001, 0, 0.001]], [0, 0, 1], samples=10000).round(2)
     array([1. , 0.5])
     """
     expect(normals is not None, "normals", "vectors", "None")
     request = check_request(octree, points, normals, leaving, threads, progress)
     check_count("samples", samples)
-    return _open_share(octree, request, cosine_hemisphere(samples), distance, turned=True)
+    reach = check_reach(max_distance, distance)
+    return _open_share(octree, request, cosine_hemisphere(samples), reach, turned=True)
 
 
 def openness(
@@ -55,22 +83,45 @@ def openness(
     points: ArrayLike,
     *,
     samples: int = 1024,
-    distance: float = np.inf,
+    max_distance: float = np.inf,
     leaving: ArrayLike | None = None,
     threads: int | None = None,
     progress: bool = False,
+    distance: float | None = None,
 ) -> Floats:
-    """The share of all directions around each point in which it sees out, (...) float64: the solid angle over 4 pi.
+    """The share of all directions around each point in which nothing is hit: the open solid angle over 4 pi.
 
-    It is 1 far from everything, 1/2 just above level ground, and 0 inside a closed mesh. A point on the surface sees
-    out through the faces that hold it. This is no mean of horizon angles, as the topographic openness of terrain is.
+    Parameters
+    ----------
+    octree : Octree or BruteForce
+    points : array_like, shape (..., 3)
+        A point on the surface sees out through the faces that hold it.
+    samples : int, default 1024
+        The number of directions, from 1 to 2^24, of equal solid angle: those of `fibonacci_sphere`.
+    leaving : array_like of int, shape (...), optional
+    max_distance : float, default inf
+    threads : int, optional
+    progress : bool, default False
+        As for `occlusion`.
+    distance : float, optional
+        The former name of `max_distance`.
 
-    samples   directions, 1 to 2^24, of equal solid angle: those of ``directions.fibonacci_sphere``
-    distance  how far the mesh hides, in scene units: nothing within it counts as open
+    Returns
+    -------
+    ndarray of float64, shape (...)
+        1 far from everything, 1/2 just above level ground, 0 inside a closed mesh.
 
-    ``points``, ``leaving``, ``threads`` and ``progress`` as for ``occlusion``. Raises ``ValueError`` naming argument
-    and row.
+    Raises
+    ------
+    ValueError
+        If an argument is not as above.
 
+    Notes
+    -----
+    This is a solid angle. The topographic openness of terrain, a mean of horizon angles, is something else.
+
+    Examples
+    --------
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box
     >>> from renderer.studies import openness
@@ -80,11 +131,11 @@ def openness(
     """
     request = check_request(octree, points, None, leaving, threads, progress)
     check_count("samples", samples)
-    return _open_share(octree, request, fibonacci_sphere(samples), distance, turned=False)
+    return _open_share(octree, request, fibonacci_sphere(samples), check_reach(max_distance, distance), turned=False)
 
 
-def _open_share(octree: Queries, request: StudyRequest, pattern: Pattern, distance: float, *, turned: bool) -> Floats:
+def _open_share(octree: Queries, request: StudyRequest, pattern: Pattern, reach: float, *, turned: bool) -> Floats:
     """The share of a pattern's directions that is open."""
     directions = pattern.directions
-    sky = Sky(directions, np.ones(len(directions)), limits_of(distance, directions), turned, False)
+    sky = Sky(directions, np.ones(len(directions)), limits_of(reach, directions), turned, False)
     return evaluate(octree, request, sky, hidden=False, share=True)

@@ -1,7 +1,6 @@
-"""Directions that stand for all of a hemisphere or sphere, each with the solid angle that it stands for.
+"""Patterns of directions that cover a hemisphere or sphere, each direction with its solid angle.
 
-All are fixed: nothing here is random. Hemispheres are about +z; azimuths run clockwise from +y, as a compass does
-where x is east and y is north.
+Nothing is random. Hemispheres are about +z; azimuths run clockwise from +y, as on a compass with x east and y north.
 """
 
 from __future__ import annotations
@@ -12,6 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.arguments.counts import count_argument
+from renderer.arguments.points import check_points
+from renderer.arguments.types import ArrayLike
+from renderer.errors import expect
 
 Floats = NDArray[np.float64]
 
@@ -24,11 +26,21 @@ MOST = 1 << 24
 
 
 class Pattern(NamedTuple):
-    """Directions and what each stands for.
+    """Directions, and the weight of each.
 
-    directions  (k, 3) float64, unit vectors
-    weights     (k,) float64, >= 0: solid angles in steradians; those of ``cosine_hemisphere`` times the cosine
+    Parameters
+    ----------
+    directions : ndarray of float64, shape (k, 3)
+        Unit vectors. Those of a hemisphere are about +z.
+    weights : ndarray of float64, shape (k,)
+        Numbers >= 0: solid angles in steradians. Those of `cosine_hemisphere` are multiplied by the cosine.
 
+    See Also
+    --------
+    tregenza, reinhart, fibonacci_hemisphere, fibonacci_sphere, cosine_hemisphere
+
+    Examples
+    --------
     >>> import numpy as np
     >>> from renderer import Octree
     >>> from renderer.studies import Pattern, sky_view_factor
@@ -41,15 +53,62 @@ class Pattern(NamedTuple):
     directions: Floats
     weights: Floats
 
+    def about(self, normals: ArrayLike) -> Floats:
+        """The directions turned about each normal: +z of the pattern goes to the normal.
+
+        Parameters
+        ----------
+        normals : array_like, shape (..., 3)
+            Vectors of any length except 0.
+
+        Returns
+        -------
+        ndarray of float64, shape (..., k, 3)
+            The k directions of each normal, as unit vectors if those of the pattern are. The normal +z leaves them
+            as they are. The turn about any other normal depends on that normal alone.
+
+        Raises
+        ------
+        ValueError
+            If a normal is not finite or is 0.
+
+        Examples
+        --------
+        >>> from renderer.studies import fibonacci_hemisphere
+        >>> directions = fibonacci_hemisphere(3).about([[0, 0, 1], [0, 0, -1]])
+        >>> directions.shape, directions[:, :, 2].round(2).tolist()
+        ((2, 3, 3), [[0.17, 0.5, 0.83], [-0.17, -0.5, -0.83]])
+        """
+        rows, shape = check_points("normals", normals)
+        zero = ~rows.any(axis=1)
+        if zero.any():
+            expect(False, "normals", "vectors that are not zero", f"{rows[zero][0].tolist()} in row {zero.argmax()}")
+        z = rows / np.abs(rows).max(axis=1, keepdims=True)
+        z /= np.linalg.norm(z, axis=1, keepdims=True)
+        x = np.cross(np.eye(3)[np.abs(z).argmin(axis=1)], z)
+        x /= np.linalg.norm(x, axis=1, keepdims=True)
+        y = np.cross(z, x)
+        level = (z == (0.0, 0.0, 1.0)).all(axis=1)
+        x[level], y[level] = np.eye(3)[:2]
+        a, b, c = np.asarray(self.directions, np.float64).T[:, :, None]
+        return (a * x[:, None] + b * y[:, None] + c * z[:, None]).reshape(*shape, len(self.directions), 3)
+
 
 def tregenza() -> Pattern:
     """Tregenza's 145 patches of the sky: seven rows of 12 degrees, and a cap of 6 degrees around the zenith.
 
-    Directions go to the patches' centres, row by row from the horizon, the first of each to +y. Weights are the
-    patches' solid angles, 2 pi in all.
+    Returns
+    -------
+    Pattern
+        Directions to the centres of the patches, row by row from the horizon up. The first of each row points to +y.
+        Weights are the solid angles of the patches; their sum is 2 pi.
 
-    Source: Tregenza, Subdivision of the sky hemisphere for luminance measurements, 1987.
+    References
+    ----------
+    Tregenza, Subdivision of the sky hemisphere for luminance measurements, 1987.
 
+    Examples
+    --------
     >>> import numpy as np
     >>> from renderer.studies import tregenza
     >>> tregenza().directions.shape, round(float(tregenza().weights.sum() / np.pi), 12)
@@ -59,13 +118,30 @@ def tregenza() -> Pattern:
 
 
 def reinhart(subdivision: int = 2) -> Pattern:
-    """Reinhart's sky "MF:m": each row of Tregenza's as m rows of m times as many patches, 144 m^2 + 1 in all.
+    """Reinhart's finer sky "MF:m": each row of Tregenza's becomes m rows of m times as many patches.
 
-    The 7 m rows are equally high, and the cap around the zenith is half as high as they are: rows of 90 / (7 m + 1/2)
-    degrees. Directions and weights as in ``tregenza``; m = 2 gives 577.
+    Parameters
+    ----------
+    subdivision : int, default 2
+        m, from 1 to 64. There are 144 m^2 + 1 patches: 577 for m = 2.
 
-    Source: Bourgeois, Reinhart, Ward, A standard daylight coefficient model for dynamic daylighting simulations, 2008.
+    Returns
+    -------
+    Pattern
+        As of `tregenza`. The 7 m rows are equally high, and the cap around the zenith is half as high: a row has
+        90 / (7 m + 1/2) degrees.
 
+    Raises
+    ------
+    ValueError
+        If `subdivision` is not such a number.
+
+    References
+    ----------
+    Bourgeois, Reinhart, Ward, A standard daylight coefficient model for dynamic daylighting simulations, 2008.
+
+    Examples
+    --------
     >>> from renderer.studies import reinhart
     >>> [len(reinhart(m).weights) for m in (1, 2, 4)]
     [145, 577, 2305]
@@ -85,10 +161,29 @@ def reinhart(subdivision: int = 2) -> Pattern:
 
 
 def fibonacci_hemisphere(count: int) -> Pattern:
-    """``count`` directions, 1 to 2^24, of equal solid angle over the hemisphere, along a spiral from the horizon up.
+    """Directions of equal solid angle over the hemisphere about +z, along a spiral from the horizon up.
 
-    Source: Swinbank, Purser, Fibonacci grids: a novel approach to global modelling, 2006.
+    Parameters
+    ----------
+    count : int
+        The number of directions, from 1 to 2^24.
 
+    Returns
+    -------
+    Pattern
+        All weights are 2 pi / `count`.
+
+    Raises
+    ------
+    ValueError
+        If `count` is not such a number.
+
+    References
+    ----------
+    Swinbank, Purser, Fibonacci grids: a novel approach to global modelling, 2006.
+
+    Examples
+    --------
     >>> from renderer.studies import fibonacci_hemisphere
     >>> fibonacci_hemisphere(2).directions[:, 2]
     array([0.25, 0.75])
@@ -99,10 +194,29 @@ def fibonacci_hemisphere(count: int) -> Pattern:
 
 
 def fibonacci_sphere(count: int) -> Pattern:
-    """``count`` directions, 1 to 2^24, of equal solid angle over the whole sphere, along a spiral from -z to +z.
+    """Directions of equal solid angle over the whole sphere, along a spiral from -z to +z.
 
-    Source: Swinbank, Purser, Fibonacci grids: a novel approach to global modelling, 2006.
+    Parameters
+    ----------
+    count : int
+        The number of directions, from 1 to 2^24.
 
+    Returns
+    -------
+    Pattern
+        All weights are 4 pi / `count`.
+
+    Raises
+    ------
+    ValueError
+        If `count` is not such a number.
+
+    References
+    ----------
+    Swinbank, Purser, Fibonacci grids: a novel approach to global modelling, 2006.
+
+    Examples
+    --------
     >>> from renderer.studies import fibonacci_sphere
     >>> fibonacci_sphere(4).directions[:, 2]
     array([-0.75, -0.25,  0.25,  0.75])
@@ -113,13 +227,31 @@ def fibonacci_sphere(count: int) -> Pattern:
 
 
 def cosine_hemisphere(count: int) -> Pattern:
-    """``count`` directions, 1 to 2^24, over the hemisphere, each of which stands for as much of the cosine.
+    """Directions over the hemisphere about +z whose density is proportional to the cosine.
 
-    So close to the pole they are denser, and seen from above they are an even spiral over the unit disc. Weights are
-    solid angle times cosine, pi in all.
+    Seen from above they are an even spiral over the unit disc.
 
-    Source: Vogel, A better way to construct the sunflower head, 1979, for the disc.
+    Parameters
+    ----------
+    count : int
+        The number of directions, from 1 to 2^24.
 
+    Returns
+    -------
+    Pattern
+        All weights are pi / `count`: solid angle times cosine.
+
+    Raises
+    ------
+    ValueError
+        If `count` is not such a number.
+
+    References
+    ----------
+    Vogel, A better way to construct the sunflower head, 1979, for the disc.
+
+    Examples
+    --------
     >>> from renderer.studies import cosine_hemisphere
     >>> (cosine_hemisphere(2).directions[:, 2] ** 2).round(12)
     array([0.25, 0.75])
@@ -130,10 +262,7 @@ def cosine_hemisphere(count: int) -> Pattern:
 
 
 def turned(directions: Floats, pole: Floats) -> Floats:
-    """Directions (k, 3) about +z, turned so that z goes to ``pole`` (3,), which is not zero; a new array.
-
-    Nothing is computed where z is there already. The turn about the pole depends on the pole alone.
-    """
+    """Directions (k, 3) about +z, turned so that z goes to ``pole`` (3,), which is not zero; a new array."""
     z = pole / np.abs(pole).max()
     z = z / np.linalg.norm(z)
     if (z == (0.0, 0.0, 1.0)).all():
@@ -145,7 +274,7 @@ def turned(directions: Floats, pole: Floats) -> Floats:
 
 
 def check_count(argument: str, count: Any) -> int:
-    """``count``, a number of directions. Raises ``ValueError`` that names the argument for what is none."""
+    """``count`` as a number of directions."""
     return count_argument(argument, count, 1, MOST)
 
 

@@ -1,4 +1,4 @@
-"""Faces seen edge-on: those whose plane an eye lies in, by exact signs."""
+"""Faces seen edge-on, whose plane holds the eye; decided exactly."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,9 @@ _SHARE, _LEAST, _FARTHEST = 2.0**-50, 2.0**-600, 2.0**200
 
 
 def are_edge_on(corners: Floats, eye: Floats) -> NDArray[np.bool_]:
-    """Whether an eye (3,) lies in the planes of faces with corners (n, 3, 3), (n,), exactly.
+    """Whether the planes of faces with corners (n, 3, 3) hold an eye (3,), exactly: (n,) bool.
 
-    The volume of face and eye is 0 there. For almost all faces float64 decides that it is not.
+    The volume of face and eye is then 0. For almost all other faces float64 rules that out.
     """
     sides = np.ones(len(corners), np.int64)
     rows = np.flatnonzero(~_are_apart(corners, eye))
@@ -33,7 +33,7 @@ def are_edge_on(corners: Floats, eye: Floats) -> NDArray[np.bool_]:
 
 
 def _are_apart(corners: Floats, eye: Floats) -> NDArray[np.bool_]:
-    """Whether float64 decides that the eye is beside a face's plane."""
+    """Whether float64 proves that the eye is off a face's plane."""
     with np.errstate(all="ignore"):  # what overflows or vanishes is not decided
         a, b, c = np.moveaxis(corners - eye, 1, 0)
         x, y = b[:, [1, 2, 0]] * c[:, [2, 0, 1]], b[:, [2, 0, 1]] * c[:, [1, 2, 0]]

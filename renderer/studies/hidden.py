@@ -2,14 +2,76 @@
 
 from __future__ import annotations
 
+from typing import Literal, overload
+
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from renderer.arguments.arrays import flag_argument
+from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.queryable import Queries
-from renderer.studies.share import check_directions, check_request, check_weights, evaluate, evaluate_bits, limits_of
+from renderer.studies.share import (
+    check_directions,
+    check_reach,
+    check_request,
+    check_weights,
+    evaluate,
+    evaluate_bits,
+    limits_of,
+)
 from renderer.studies.sweep import Sky
+
+
+@overload
+def occlusion(
+    octree: Queries,
+    points: ArrayLike,
+    normals: ArrayLike | None,
+    directions: ArrayLike,
+    *,
+    weights: ArrayLike | None = None,
+    leaving: ArrayLike | None = None,
+    packed: Literal[False] = False,
+    max_distance: float = np.inf,
+    threads: int | None = None,
+    progress: bool = False,
+    distance: float | None = None,
+) -> NDArray[np.float64]: ...
+
+
+@overload
+def occlusion(
+    octree: Queries,
+    points: ArrayLike,
+    normals: ArrayLike | None,
+    directions: ArrayLike,
+    *,
+    weights: ArrayLike | None = None,
+    leaving: ArrayLike | None = None,
+    packed: Literal[True],
+    max_distance: float = np.inf,
+    threads: int | None = None,
+    progress: bool = False,
+    distance: float | None = None,
+) -> NDArray[np.uint8]: ...
+
+
+@overload
+def occlusion(
+    octree: Queries,
+    points: ArrayLike,
+    normals: ArrayLike | None,
+    directions: ArrayLike,
+    *,
+    weights: ArrayLike | None = None,
+    leaving: ArrayLike | None = None,
+    packed: bool = False,
+    max_distance: float = np.inf,
+    threads: int | None = None,
+    progress: bool = False,
+    distance: float | None = None,
+) -> NDArray[np.float64] | NDArray[np.uint8]: ...
 
 
 def occlusion(
@@ -21,42 +83,74 @@ def occlusion(
     weights: ArrayLike | None = None,
     leaving: ArrayLike | None = None,
     packed: bool = False,
-    distance: float = np.inf,
+    max_distance: float = np.inf,
     threads: int | None = None,
     progress: bool = False,
+    distance: float | None = None,
 ) -> NDArray[np.float64] | NDArray[np.uint8]:
-    """The share of directions that is HIDDEN from each point, (...) float64 from 0 to 1; or one bit for each of them.
+    """The share of directions that is HIDDEN from each point, or one bit for each point and direction.
 
-    A direction d is hidden if it is at the point's horizon or below, d . n <= 0 as float64 computes it of the unit
-    normal n, or if a ray in direction d hits the mesh, see ``octree.any_hit``.
+    A direction d is hidden if it lies at or below the horizon of the point, d . n <= 0 for the unit normal n, or if a
+    ray in this direction hits the mesh.
 
-    points      (..., 3), finite
-    normals     (..., 3) as points, or one (3,) for all; not zero, of any length; None: no point has a horizon
-    directions  (k, 3), the same for all points, of any length as those of rays
-    weights     (k,) >= 0, not all 0: what each direction counts; None: all the same
-    leaving     the face that each point lies on, (...) or one for all, -1 where that is not known; None: -1 for all. A
-                point is then on the surface where it is as near as 32 roundings of float64 of its largest coordinate;
-                or, if all its coordinates are numbers of float32, where each is as near as 8 of its own roundings to
-                float32. Rays start at the point of the face that is nearest: no epsilon is needed. The normal says on
-                which side of the faces there the point is: directions that lead through them to another side are
-                hidden. Without a normal the faces that hold the point hide nothing
-    packed      True: (..., ceil(k / 8)) uint8 with a set bit for each hidden direction, in the order of
-                ``numpy.unpackbits(..., axis=-1, count=k)``. There are no weights then
-    distance    how far the mesh hides, in scene units
-    threads     None: as many as the octree has; they share the points, of which each is one thread's
-    progress    a bar on standard error when that is a terminal
+    Parameters
+    ----------
+    octree : Octree or BruteForce
+    points : array_like, shape (..., 3)
+        Finite; on the surface or not.
+    normals : array_like, shape (..., 3) or (3,), or None
+        One for each point or one for all, of any length except 0. None: no point has a horizon.
+    directions : array_like, shape (k, 3)
+        The same for all points, of any length that rays may have.
+    weights : array_like, shape (k,), optional
+        How much each direction counts: numbers >= 0, not all 0. By default all count the same.
+    leaving : array_like of int, shape (...) or scalar, optional
+        The face that each point lies on; -1 where it is not known, which is the default. See Notes.
+    packed : bool, default False
+        Return bits, not shares. There are no `weights` then.
+    max_distance : float, default inf
+        How far from a point a hit still counts, in scene units.
+    threads : int, optional
+        By default those of the octree.
+    progress : bool, default False
+        Show a bar on standard error if that is a terminal.
+    distance : float, optional
+        The former name of `max_distance`.
 
-    The share is the sum of the weights of the hidden directions over the sum of all, both in the order of directions:
-    exactly 0 where all is open and 1 where all is hidden. A point's bits depend neither on threads nor on the other
-    points. Nothing of the size n x k is made but the bits. Raises ``ValueError`` naming argument and row.
+    Returns
+    -------
+    ndarray of float64, shape (...)
+        The weights of the hidden directions over all weights: exactly 0 if all is open, exactly 1 if all is hidden.
+    ndarray of uint8, shape (..., ceil(k / 8))
+        If `packed`: a set bit for each hidden direction, in the order of ``numpy.unpackbits(..., axis=-1, count=k)``.
 
+    Raises
+    ------
+    ValueError
+        If an argument is not as above. The message names the argument and the row.
+
+    Notes
+    -----
+    Points on the surface need no epsilon. A point is on the surface if it is within 32 roundings of float64 of its
+    largest coordinate, or, if float32 holds all its coordinates, within 8 of its own roundings to float32. A point
+    that is farther off, up to the error of float32, lies on the face that `leaving` names. Rays start at the nearest
+    point of the face.
+
+    The normal says on which side of its faces a point lies: directions that lead through them to the other side are
+    hidden. Without a normal the faces that hold the point hide nothing.
+
+    The bits of a point depend neither on the threads nor on the other points. Memory is that of the points and of the
+    result: rays are never written down.
+
+    Examples
+    --------
     >>> import numpy as np
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box
     >>> from renderer.studies import occlusion
     >>> octree = Octree.from_mesh(box((0, 0, 0), (1, 1, 1)))
     >>> around = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    >>> occlusion(octree, [[3, 0.5, 0.25], [9, 9, 9]], None, around)
+    >>> occlusion(octree, [[3, 0.5, 0.25], [9.0, 9, 9]], None, around)
     array([0.25, 0.  ])
     >>> bits = occlusion(octree, [[3, 0.5, 0.25]], [0, 0, 1], around, packed=True)
     >>> np.unpackbits(bits, axis=-1, count=4)
@@ -64,7 +158,7 @@ def occlusion(
     """
     request = check_request(octree, points, normals, leaving, threads, progress)
     directions = check_directions("directions", directions)
-    limits = limits_of(distance, directions)
+    limits = limits_of(check_reach(max_distance, distance), directions)
     if flag_argument("packed", packed):
         expect(weights is None, "weights", "None, as bits have none", "an array")
         return evaluate_bits(octree, request, Sky(directions, np.ones(len(directions)), limits, False, False))

@@ -6,32 +6,31 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from tokenize import TokenError
-from typing import Any
+from typing import Any, Literal
 from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.arguments.types import ArrayLike
+from renderer.arguments.up import up_axis
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.ordering.morton import order_along_curve
-from renderer.studies.places import face_points
+from renderer.studies.grid import grid_points
+from renderer.studies.places import face_areas, face_points
 
 Floats = NDArray[np.float64]
 # What NumPy raises for files that it cannot read: a header is parsed as Python, and PK begins an archive.
 _BROKEN = (ValueError, EOFError, TypeError, OverflowError, SyntaxError, TokenError, BadZipFile)
-# Points that are put in order together: 32 bytes each while it is done, and a second of sorting.
+# Points that are sorted together: 32 bytes each, and a second of work.
 _TOGETHER = 1 << 22
-# More would not fit into memory with their normals and results: 7 numbers of 8 bytes each.
-_MOST = 1 << 28
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """The points of a study: ``points`` and ``normals`` (n, 3) float64, and ``leaving`` (n,) int64, -1 for a face that
-    is not known.
-    """
+    """The points of a study: ``points`` and ``normals`` (n, 3) float64, ``leaving`` (n,) int64, -1 for no face."""
 
     points: Floats
     normals: Floats
@@ -41,11 +40,11 @@ class Points:
         return len(self.points)
 
     def part(self, rows: slice | NDArray[np.int64]) -> Points:
-        """Those of some rows."""
+        """The points of some rows."""
         return Points(self.points[rows], self.normals[rows], self.leaving[rows])
 
     def order(self) -> NDArray[np.int64]:
-        """The rows (n,) in which those that follow each other lie together, along a curve that fills space."""
+        """The rows (n,) along a space-filling curve, so that neighbours follow each other."""
         rows = np.empty(len(self), np.int64)
         for first in range(0, len(self), _TOGETHER):
             rows[first : first + _TOGETHER] = first + order_along_curve(self.points[first : first + _TOGETHER])[0]
@@ -54,10 +53,10 @@ class Points:
 
 @dataclass(frozen=True, eq=False)
 class Chosen:
-    """Points, and functions that spread their answers over the mesh.
+    """Points, and how their results become values of the mesh.
 
-    of_faces : from the answers (n,) to one a face (F,), NaN where a face has none; None where points are on no faces.
-    of_vertices : to one a vertex (V,), NaN where it has none; None likewise.
+    of_faces     from results (n,) to values of faces (F,), NaN for a face without; None if faces get no values
+    of_vertices  the same for vertices (V,)
     """
 
     points: Points
@@ -78,14 +77,13 @@ def on_faces(octree: Octree) -> Chosen:
 
 
 def on_vertices(octree: Octree) -> Chosen:
-    """As on faces; a vertex gets the mean of its faces' answers by their areas.
+    """The points of ``on_faces``; a vertex gets the mean of its faces' values, weighted by their areas.
 
-    A vertex has no normal of its own, by which studies know its side.
+    A vertex has no normal of its own, and studies need one to know its side.
     """
     chosen, mesh = on_faces(octree), octree.mesh
     assert chosen.of_faces is not None
-    corners = mesh.triangles
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    areas = face_areas(mesh)
 
     def of_vertices(answers: Floats) -> Floats:
         assert chosen.of_faces is not None
@@ -100,35 +98,24 @@ def on_vertices(octree: Octree) -> Chosen:
     return Chosen(chosen.points, None, of_vertices)
 
 
-def on_grid(octree: Octree, spacing: float) -> Chosen:
-    """A grid of points as seen from above (z up): where vertical rays first meet the mesh, on the upper side.
-
-    The points of the grid lie at multiples of ``spacing`` above the lower left corner of the mesh's box, half a
-    spacing in; where a ray meets nothing there is no point.
-    """
-    expect(bool(0.0 < spacing < np.inf), "--grid", "a number > 0, in the mesh's units", f"{spacing:g}")
-    lower, upper = octree.mesh.bounds
-    with np.errstate(over="ignore"):
-        counts = np.maximum(1.0, np.ceil((upper - lower)[:2] / spacing))
-        number = counts.prod()
-    expect(number <= _MOST, "--grid", f"a spacing with at most {_MOST:,} points", f"{number:.4g}")
-    x, y = (lower[a] + spacing * (np.arange(int(counts[a])) + 0.5) for a in (0, 1))
-    # The last may stand beside the mesh, and too far away for any ray.
-    x, y = x[x <= upper[0]], y[y <= upper[1]]
-    start = float(upper[2]) + float(np.abs(octree.mesh.bounds).max()) * 2.0**-20 + float(octree.mesh.extent.max())
-    origins = np.stack([*(g.ravel() for g in np.meshgrid(x, y)), np.full(len(x) * len(y), start)], axis=1)
-    hits = octree.closest_hit(origins, (0.0, 0.0, -1.0))
-    seen = np.flatnonzero(hits.hit)
-    expect(len(seen) > 0, "--grid", "points above the mesh", "none")
-    normals = hits.normals[seen]
-    normals[normals[:, 2] < 0.0] *= -1.0
-    return Chosen(Points(hits.points[seen], normals, hits.face[seen].astype(np.int64)))
+def on_grid(
+    octree: Octree,
+    spacing: float,
+    *,
+    bounds: ArrayLike | None = None,
+    height: float | None = None,
+    up: Literal["x", "y", "z"] = "z",
+) -> Chosen:
+    """The points of ``grid_points``, at least one."""
+    found = grid_points(octree, spacing, bounds=bounds, height=height, up=up)
+    expect(len(found.points) > 0, "spacing", "points above the mesh", "none")
+    return Chosen(Points(*found))
 
 
-def of_file(octree: Octree, path: Path) -> Chosen:
-    """Points of an ``.npy`` file, (n, 3), or (n, 6) with normals behind them. Points without normals look up.
+def of_file(octree: Octree, path: Path, up: Literal["x", "y", "z"] = "z") -> Chosen:
+    """Points of an ``.npy`` file, (n, 3), or (n, 6) with normals. Points without normals look up.
 
-    Studies find out which of them lie on the surface, and on which faces.
+    Studies find the faces of those that lie on the surface.
     """
     array = _read_array("--points", path)
     good = array.ndim == 2 and array.shape[1] in (3, 6) and len(array) > 0
@@ -136,14 +123,14 @@ def of_file(octree: Octree, path: Path) -> Chosen:
     points = np.ascontiguousarray(array[:, :3], np.float64)
     normals = np.ascontiguousarray(array[:, 3:], np.float64) if array.shape[1] == 6 else np.zeros(points.shape)
     if array.shape[1] == 3:
-        normals[:, 2] = 1.0
+        normals[:, up_axis(up)] = 1.0
     return Chosen(Points(points, normals, np.full(len(points), -1, np.int64)))
 
 
 def suns_of(path: Path) -> tuple[Floats, Floats]:
-    """Directions to the sun (k, 3) and the hours of each (k,) of a text file: x y z and hours, or x y z for one hour.
+    """Directions to the sun (k, 3) and hours (k,) from a text file with rows x y z hours, or x y z for one hour.
 
-    A line that begins with # is none; numbers are parted by spaces or commas.
+    Numbers are separated by spaces or commas. Lines that begin with # are comments.
     """
     try:
         text = path.read_text(encoding="utf-8").replace(",", " ")

@@ -1,4 +1,4 @@
-"""Studies from Python: checked arguments, tiles on threads, and results."""
+"""What all studies share: checked arguments, tiles on threads, and results."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from renderer.arguments.arrays import flag_argument, real_argument
 from renderer.arguments.limits import LONGEST, SHORTEST
 from renderer.arguments.points import check_points, farthest_of
+from renderer.arguments.types import ArrayLike
 from renderer.distance.on_surface import check_on, on_surface
 from renderer.errors import expect
 from renderer.ordering.morton import order_along_curve
@@ -23,19 +24,24 @@ from renderer.trace.batch import check_faces
 
 Floats = NDArray[np.float64]
 
-# Points that are put in order together: 16 bytes each for it, and a second of sorting.
+# Points that are sorted together: 16 bytes each, and a second of work.
 _BLOCK = 1 << 22
-# The points of a chunk, at most and at least, where there are enough for all threads.
+# The points of a chunk: at most, and at least if there are enough for all threads.
 _MOST, _LEAST = 64 * TILE, 16
 
 
 class StudyRequest(NamedTuple):
-    """Where a study is made, and how: points (n, 3) with the leading dimensions that were given, and the threads."""
+    """The points of a study (n, 3), their shape as given, and how it runs."""
 
     places: Places
     shape: tuple[int, ...]
     threads: int
     progress: bool
+
+
+def expect_octree(octree: object) -> None:
+    """Raise ``ValueError`` for what takes no queries."""
+    expect(isinstance(octree, Queries), "octree", "an Octree or a BruteForce", type(octree).__name__)
 
 
 def check_request(
@@ -46,8 +52,8 @@ def check_request(
     threads: int | None,
     progress: bool,
 ) -> StudyRequest:
-    """The arguments that all studies have, checked. Raises ``ValueError`` naming argument and row."""
-    expect(isinstance(octree, Queries), "octree", "an Octree or a BruteForce", type(octree).__name__)
+    """Check the arguments that all studies have."""
+    expect_octree(octree)
     rows, shape = check_points("points", points, farthest_of(octree.tree.scale))
     faces = check_faces("leaving", -1 if leaving is None else leaving, shape, len(octree.mesh.faces))
     check_on(octree.mesh, "points", rows, faces)
@@ -102,22 +108,30 @@ def lengths_of(directions: Floats) -> Floats:
     return largest[:, 0] * np.sqrt(((directions / largest) ** 2).sum(axis=1))
 
 
+def check_reach(max_distance: float, distance: float | None) -> float:
+    """The farthest distance that counts; ``distance`` is the former name of the argument."""
+    name, value = ("max_distance", max_distance) if distance is None else ("distance", distance)
+    one = distance is None or (np.ndim(max_distance) == 0 and max_distance == np.inf)
+    expect(one, "distance", "max_distance alone, which is its name now", "both")
+    given = real_argument(name, value)
+    expect(given.ndim == 0 and bool(given >= 0.0), name, "a number >= 0", repr(value))
+    return float(given)
+
+
 def limits_of(distance: float, directions: Floats) -> Floats:
-    """The t at which rays in these directions are as far as ``distance``, which must be a number >= 0, or inf."""
-    given = real_argument("distance", distance)
-    expect(given.ndim == 0 and bool(given >= 0.0), "distance", "a number >= 0", repr(distance))
-    return float(given) / lengths_of(directions)
+    """The t at which rays in these directions have gone ``distance``."""
+    return distance / lengths_of(directions)
 
 
 def evaluate(octree: Queries, request: StudyRequest, sky: Sky, *, hidden: bool, share: bool) -> Floats:
-    """The sums over the hidden or open directions of each point, as they are or as shares of all; see ``Answers``."""
+    """The sums over the hidden or open directions of each point, or their shares; see ``Answers``."""
     sums = np.empty(len(request.places.points))
     run(octree, request, sky, Answers(sums, np.empty((0, 1), np.uint8), hidden, share))
     return sums.reshape(request.shape)
 
 
 def evaluate_bits(octree: Queries, request: StudyRequest, sky: Sky) -> NDArray[np.uint8]:
-    """A bit for each point and direction that is hidden from it."""
+    """For each point a set bit for each hidden direction."""
     width = -(-len(sky.directions) // 8)
     bits = np.zeros((len(request.places.points), width), np.uint8)
     run(octree, request, sky, Answers(np.empty(0), bits, True, False))
@@ -125,7 +139,7 @@ def evaluate_bits(octree: Queries, request: StudyRequest, sky: Sky) -> NDArray[n
 
 
 def run(octree: Queries, request: StudyRequest, sky: Sky, answers: Answers) -> None:
-    """Let all points look in all directions, and write to ``answers``: points in an order of our own, on threads."""
+    """Trace all points in all directions on threads, in the order of a curve, and write to ``answers``."""
     mesh, tree = octree._built
     count = len(request.places.points)
     faces, codes, anchors = on_surface(tree, mesh, request.places.points, request.places.leaving, request.threads)
@@ -135,7 +149,7 @@ def run(octree: Queries, request: StudyRequest, sky: Sky, answers: Answers) -> N
             block = request.places.points[first : first + _BLOCK]
             order, steps = order_along_curve(block)
             order = first + order
-            # Else the way that a tile's rays share costs more than it saves: up to 58 % with a point for 30 faces.
+            # With few points the shared beam of a tile costs more than it saves: up to 58 % at a point for 30 faces.
             steps = steps if are_dense(block, mesh) else steps[:0]
 
             def look(begin: int, end: int, way: tuple[NDArray[np.int64], ...] = (order, steps)) -> Iterator[None]:

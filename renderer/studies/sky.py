@@ -5,14 +5,17 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from renderer.arguments.counts import count_argument
+from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.queryable import Queries
 from renderer.studies.directions import MOST, Pattern, fibonacci_hemisphere, reinhart, tregenza, turned
+from renderer.studies.pole import pole_of
 from renderer.studies.share import (
     check_directions,
+    check_reach,
     check_request,
     check_weights,
     evaluate,
@@ -24,7 +27,6 @@ from renderer.studies.sweep import Sky
 Floats = NDArray[np.float64]
 
 _DEFINITIONS = ("cosine", "geometric")
-_UP = (0.0, 0.0, 1.0)
 
 
 def sky_view_factor(
@@ -34,51 +36,80 @@ def sky_view_factor(
     *,
     patches: int | Pattern = 145,
     definition: Literal["cosine", "geometric"] = "cosine",
-    up: ArrayLike = _UP,
+    up: Literal["x", "y", "z"] | ArrayLike = "z",
     leaving: ArrayLike | None = None,
-    distance: float = np.inf,
+    max_distance: float = np.inf,
     threads: int | None = None,
     progress: bool = False,
+    distance: float | None = None,
 ) -> Floats:
-    """The sky view factor of each point, (...) float64 from 0 to 1.
+    """The sky view factor of each point, from 0 to 1.
 
-    The sky is the hemisphere of directions above the plane across ``up``; a direction of it is open where it is above
-    the plane across the point's normal n, too, and its ray hits nothing.
+    The sky is the hemisphere about `up`. A direction of it is open if it lies above the horizon of the point, d . n > 0
+    for the unit normal n, and if its ray hits nothing.
 
-    definition  "cosine": the share of the light of an even sky that falls on the point's own plane, 1/pi times the
-                integral of d . n over the open directions d: 1 for a level point in the open, (1 + cos b) / 2 for one
-                tilted by b. This is the view factor of radiation (Johnson and Watson, Oke)
-                "geometric": the share of the sky's solid angle that is open, 1/(2 pi) times the integral of 1
-    patches     145: Tregenza's; 577: Reinhart's MF:2; any other number: as many directions of equal solid angle,
-                ``directions.fibonacci_hemisphere``; or a ``directions.Pattern`` of directions about +z, all with z > 0
-    up          (3,), to the middle of the sky; +z of the patches goes there
-    normals     as for ``occlusion``; None: ``up``, as of the level ground
+    Parameters
+    ----------
+    octree : Octree or BruteForce
+    points : array_like, shape (..., 3)
+    normals : array_like, shape (..., 3) or (3,), optional
+        As for `occlusion`. By default `up`, the normal of level ground.
+    patches : int or Pattern, default 145
+        How the sky is divided. 145: Tregenza's patches. 577: Reinhart's MF:2. Any other number up to 2^24: as many
+        directions of equal solid angle, see `fibonacci_hemisphere`. Or a `Pattern` about +z, all of it with z > 0.
+    definition : {"cosine", "geometric"}, default "cosine"
+        "cosine": the share of the light of an even sky that falls on the plane of the point, 1/pi times the integral
+        of d . n over the open directions d. It is 1 for a level point in the open, and (1 + cos b) / 2 for one tilted
+        by b. "geometric": the share of the solid angle of the sky that is open, 1/(2 pi) times the integral of 1.
+    up : {"x", "y", "z"} or array_like, shape (3,), default "z"
+        The axis or direction that points up, to the middle of the sky.
+    leaving : array_like of int, shape (...), optional
+    max_distance : float, default inf
+    threads : int, optional
+    progress : bool, default False
+        As for `occlusion`.
+    distance : float, optional
+        The former name of `max_distance`.
 
-    ``points``, ``leaving``, ``distance``, ``threads`` and ``progress`` as for ``occlusion``. Each patch is open or not
-    as one ray to its middle says. Sums over open patches are divided by sums over all: for "cosine" of weight times
-    |d . n|, as the patches and their opposites cover the sphere. So rounding apart a level point in the open has 1
-    whatever the patches, and a wall 1/2 by "cosine" with Tregenza's or Reinhart's, which come in opposite pairs.
-    Raises ``ValueError`` naming argument and row.
+    Returns
+    -------
+    ndarray of float64, shape (...)
 
-    Sources: Johnson, Watson, The determination of view-factors in urban canyons, 1984; Oke, Boundary Layer Climates,
-    1987.
+    Raises
+    ------
+    ValueError
+        If an argument is not as above. The message names the argument and the row.
 
+    Notes
+    -----
+    One ray to its middle decides whether a patch is open. The result is the sum over the open patches divided by the
+    sum over all. For "cosine" each patch counts its weight times abs(d . n) in both sums, as the patches and their
+    opposites cover the sphere. So a level point in the open has 1 whatever the patches.
+
+    References
+    ----------
+    Johnson, Watson, The determination of view-factors in urban canyons, 1984.
+
+    Oke, Boundary Layer Climates, 1987.
+
+    Examples
+    --------
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box
     >>> from renderer.studies import sky_view_factor
     >>> octree = Octree.from_mesh(box((0, -500, 0), (1, 500, 500)))
-    >>> sky_view_factor(octree, [[9, 0, 900], [1.001, 0, 0.001]], patches=10000).round(2)
+    >>> sky_view_factor(octree, [[9.0, 0, 900], [1.001, 0, 0.001]], patches=10000).round(2)
     array([1. , 0.5])
     """
     _expect_definition(definition)
-    pole = _pole(up)
+    pole = pole_of(up)
     request = check_request(octree, points, pole if normals is None else normals, leaving, threads, progress)
     pattern = _patches(patches)
     directions = turned(pattern.directions, pole)
     # rule: cosine-of-patches
     cosine = definition == "cosine"
     values = pattern.weights / lengths_of(directions) if cosine else pattern.weights
-    sky = Sky(directions, values, limits_of(distance, directions), False, cosine)
+    sky = Sky(directions, values, limits_of(check_reach(max_distance, distance), directions), False, cosine)
     return evaluate(octree, request, sky, hidden=False, share=True)
 
 
@@ -89,32 +120,70 @@ def sun_hours(
     sun_directions: ArrayLike,
     weights: ArrayLike | None = None,
     *,
+    up: Literal["x", "y", "z"] | ArrayLike | None = None,
     leaving: ArrayLike | None = None,
-    distance: float = np.inf,
+    max_distance: float = np.inf,
     threads: int | None = None,
     progress: bool = False,
+    distance: float | None = None,
 ) -> Floats:
-    """The hours for which each point sees the sun, (...) float64: the sum of the weights of the suns that it sees.
+    """The hours for which each point sees the sun: the sum of the weights of the sun positions that it sees.
 
-    sun_directions  (k, 3), from the points to the sun, as a library of sun positions gives them
-    weights         (k,) >= 0, the hours that each direction stands for; None: 1 each
+    A point does not see a sun at or below its own horizon, nor one that the mesh hides.
 
-    A sun at or below the point's own horizon is not seen, nor is one that the mesh hides; see ``occlusion`` for this
-    and the other arguments. A sun below the level ground is hidden by the ground only if the mesh has one, or the
-    normals are level: leave it out. Sums are in the order of directions. Raises ``ValueError`` naming argument and row.
+    Parameters
+    ----------
+    octree : Octree or BruteForce
+    points : array_like, shape (..., 3)
+    normals : array_like, shape (..., 3) or (3,), or None
+        As for `occlusion`.
+    sun_directions : array_like, shape (k, 3)
+        From the points to the sun, in the coordinates of the mesh, one for each step of time.
+    weights : array_like, shape (k,), optional
+        The hours of each step, >= 0. By default 1 each.
+    up : {"x", "y", "z"} or array_like, shape (3,), optional
+        The axis or direction that points up: suns at or below the level horizon then count nothing. By default they
+        count like all others, and light walls from below where the mesh has no ground.
+    leaving : array_like of int, shape (...), optional
+    max_distance : float, default inf
+    threads : int, optional
+    progress : bool, default False
+        As for `occlusion`.
+    distance : float, optional
+        The former name of `max_distance`.
+
+    Returns
+    -------
+    ndarray of float64, shape (...)
+        In the unit of `weights`.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not as above. The message names the argument and the row.
+
+    Examples
+    --------
+    West of a wall, which hides the sun of the morning; the last sun is that of the night.
 
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box
     >>> from renderer.studies import sun_hours
     >>> octree = Octree.from_mesh(box((0, -9, 0), (1, 9, 9)))
-    >>> suns = [[-1, 0, 1], [0, -1, 2], [1, 0, 1]]  # morning, noon, evening; west of a wall
-    >>> sun_hours(octree, [[2, 0, 0]], [0, 0, 1], suns, [3.0, 4.0, 3.5])
+    >>> suns = [[1, 0, 1], [0, -1, 2], [-1, 0, 1], [0, 1, -2]]
+    >>> sun_hours(octree, [[-2, 0, 0]], None, suns, [3.0, 4.0, 3.5, 13.5], up="z")
     array([7.5])
     """
     request = check_request(octree, points, normals, leaving, threads, progress)
     suns = check_directions("sun_directions", sun_directions)
     hours = check_weights("weights", weights, len(suns))
-    sky = Sky(suns, hours, limits_of(distance, suns), False, False)
+    reach = check_reach(max_distance, distance)
+    if up is not None:
+        day = _scaled(suns) @ _scaled(pole_of(up)) > 0.0
+        if not day.any():
+            return np.zeros(request.shape)
+        suns, hours = suns[day], hours[day]
+    sky = Sky(suns, hours, limits_of(reach, suns), False, False)
     return evaluate(octree, request, sky, hidden=False, share=False)
 
 
@@ -123,11 +192,9 @@ def _expect_definition(definition: str) -> None:
     expect(known, "definition", f"one of {list(_DEFINITIONS)}", repr(definition))
 
 
-def _pole(up: ArrayLike) -> Floats:
-    """The direction of the middle of the sky."""
-    rows = check_directions("up", np.reshape(up, (1, -1)) if np.ndim(up) == 1 else up)
-    expect(len(rows) == 1, "up", "shape (3,)", f"shape {rows.shape}")
-    return rows[0]
+def _scaled(vectors: Floats) -> Floats:
+    """Vectors (..., 3) whose largest component is 1, so that products do not overflow."""
+    return vectors / np.abs(vectors).max(axis=-1, keepdims=True)
 
 
 def _patches(patches: int | Pattern) -> Pattern:

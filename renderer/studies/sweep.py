@@ -1,9 +1,8 @@
-"""Points times directions that are never written down: a tile of points, and one direction after the other.
+"""Rays from many points in many directions, traced tile by tile without writing them all down.
 
-A tile is up to TILE points that are near each other. All of them look in one direction, then in the next, so the rays
-that are traced together are parallel and start side by side: packets. What a point's horizon hides is no ray. A point
-adds its directions up in their order, whatever tile it is in, and rays do not know of each other: so the bits of its
-result do not depend on the points beside it.
+A tile is up to TILE points that lie together. The rays of a tile in one direction are traced together, as a packet of
+parallel rays; then those in the next direction. Directions below a point's horizon need no ray. Each point sums its
+directions in their order, and no ray depends on another, so the bits of its result do not depend on its tile.
 """
 
 from typing import Any, NamedTuple
@@ -77,7 +76,7 @@ _LEFT, _TABLES, _POINT_INTEGERS = 4 * TILE, 4 * TILE + 1, 4 * TILE + 8
 
 
 class Places(NamedTuple):
-    """Where rays start. normals has one row for all, or none where there is no horizon.
+    """Where rays start. ``normals`` has one row for all points, or no row if points have no horizon.
 
     points (n, 3), normals (n, 3), (1, 3) or (0, 3) float64, not zero; leaving (n,) int64, -1 for a point that is on no
     face; codes (n,) int64 and anchors (n, 3) float64, as of ``on_surface.SurfacePoints``
@@ -95,8 +94,8 @@ class Sky(NamedTuple):
 
     directions  (k, 3) float64
     values      (k,) float64: what each adds to the sums
-    limits      (k,) float64: beyond which t nothing hides
-    turned      whether directions are those of each point's own frame, whose z is its normal
+    limits      (k,) float64: hits beyond this t do not count
+    turned      whether directions are in the frame of each point, whose z is its normal
     cosine      whether values are multiplied by the cosine between direction and normal
     """
 
@@ -108,12 +107,12 @@ class Sky(NamedTuple):
 
 
 class Answers(NamedTuple):
-    """Where results go: each of the arrays may have no row.
+    """Where results go; an array without rows is not written.
 
-    sums    (n,) float64: the sum over the hidden directions, or the open ones
-    bits    (n, ceil(k / 8)) uint8, zeros before: a bit for each hidden direction, as ``numpy.packbits`` has them
-    hidden  whether the hidden directions are added up, not the open ones
-    share   whether sums are divided by that over all directions, those below the horizon included
+    sums    (n,) float64: the sum over the hidden or the open directions
+    bits    (n, ceil(k / 8)) uint8, zeros at first: a bit for each hidden direction, in the order of ``numpy.packbits``
+    hidden  whether to sum the hidden directions; else the open ones
+    share   whether to divide by the sum over all directions, including those below the horizon
     """
 
     sums: NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""What is seen from one place: faces from an eye, depths from a camera, points from a scanner."""
+"""What is seen from one place: faces by an eye, depths by a camera, points by a scanner."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from numbers import Integral
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from renderer.arguments.arrays import flag_argument, real_array
 from renderer.arguments.counts import count_argument
 from renderer.arguments.points import check_points, farthest_of
+from renderer.arguments.types import ArrayLike
 from renderer.distance.on_surface import on_surface
 from renderer.errors import expect
 from renderer.mesh.mesh import face_normals
@@ -19,7 +20,7 @@ from renderer.queryable import Queries
 from renderer.results.hits import Hits, points_on
 from renderer.studies.directions import Pattern, check_count, fibonacci_sphere
 from renderer.studies.edge_on import are_edge_on
-from renderer.studies.share import check_directions, lengths_of, limits_of
+from renderer.studies.share import check_directions, check_reach, expect_octree, lengths_of, limits_of
 from renderer.system.terminal import progress_bar
 from renderer.trace.batch import Leaving, check_rays, offset_origins
 from renderer.trace.closest import closest_hits
@@ -37,21 +38,32 @@ _MOST_CUTS = 64
 
 
 class Camera(Protocol):
-    """A camera: the affine map from film to rays (6, 3), as ``PerspectiveCamera.rows`` has it."""
+    """Anything with the rays of a camera, such as a ``PerspectiveCamera``."""
 
     def rows(self, width: int, height: int) -> Floats:
-        """Origin, its steps along x and y, direction, and its steps."""
+        """The affine map from film to rays (6, 3): origin, its steps along x and y, direction, and its steps."""
 
 
 class Scan(NamedTuple):
-    """Where the rays of a scanner met the mesh: m of k rays, in their order.
+    """The point cloud of a scanner: the hits of its rays, in the order of the rays. Rays that miss are left out.
 
-    points     (m, 3) float64
-    normals    (m, 3) float64, unit vectors by the faces' winding
-    distances  (m,) float64 from the scanner, in scene units
-    faces      (m,) int64
-    rays       (m,) int64, the rows of their directions
+    Attributes
+    ----------
+    points : ndarray of float64, shape (m, 3)
+    normals : ndarray of float64, shape (m, 3)
+        Unit vectors, on the side from which the corners of the face run counter-clockwise.
+    distances : ndarray of float64, shape (m,)
+        From the scanner, in scene units.
+    faces : ndarray of int64, shape (m,)
+    rays : ndarray of int64, shape (m,)
+        The row of each ray in the directions of the scanner.
 
+    See Also
+    --------
+    scan
+
+    Examples
+    --------
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box
     >>> from renderer.studies import scan
@@ -68,17 +80,40 @@ class Scan(NamedTuple):
 
 
 def visible_faces(octree: Queries, eye: ArrayLike, *, cuts: int = 1, progress: bool = False) -> NDArray[np.bool_]:
-    """Which faces are seen from an eye (3,), (F,) bool: whether a ray from one of some points of each reaches it.
+    """Which faces are seen from an eye: those of which at least one sample point sees the eye.
 
-    cuts  each face is cut into cuts^2 equal triangles, 1 to 64 along a side, whose centroids are these points; 1: its
-          centroid alone
+    Parameters
+    ----------
+    octree : Octree or BruteForce
+    eye : array_like, shape (3,)
+        An eye on the surface is not hidden by the faces that hold it.
+    cuts : int, default 1
+        From 1 to 64. Each face is cut into cuts^2 equal triangles, and their centroids are its sample points. A face
+        that is seen only between them counts as hidden.
+    progress : bool, default False
+        Show a bar on standard error if that is a terminal.
 
-    A face that is seen only between these points counts as hidden; one that counts as seen is seen there. Rays leave
-    the faces without an epsilon, to the side of the eye: so one sheet is seen from behind, too, and of a closed mesh
-    only what looks to the eye. An eye on the surface is not hidden by the faces that hold it; see ``octree.visible``,
-    which this calls. A face without area is not seen, and neither is one whose plane the eye lies in,
-    exactly. Raises ``ValueError`` naming the argument.
+    Returns
+    -------
+    ndarray of bool, shape (F,)
+        False for a face without area, and for one whose plane holds the eye, exactly.
 
+    Raises
+    ------
+    ValueError
+        If an argument is not as above.
+
+    See Also
+    --------
+    renderer.Octree.visible
+
+    Notes
+    -----
+    Rays leave the faces on the side of the eye, without an epsilon. So a single sheet is seen from behind, too; of a
+    closed mesh only those faces are seen that look towards the eye.
+
+    Examples
+    --------
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box
     >>> from renderer.studies import visible_faces
@@ -86,7 +121,7 @@ def visible_faces(octree: Queries, eye: ArrayLike, *, cuts: int = 1, progress: b
     >>> visible_faces(octree, [0.5, 0.5, 9]).nonzero()[0]
     array([10, 11])
     """
-    _expect_octree(octree)
+    expect_octree(octree)
     place = _one_place("eye", eye, octree)
     cuts = count_argument("cuts", cuts, 1, _MOST_CUTS)
     mesh = octree.mesh
@@ -107,15 +142,31 @@ def visible_faces(octree: Queries, eye: ArrayLike, *, cuts: int = 1, progress: b
 
 
 def depth_map(octree: Queries, camera: Camera, width: int, height: int, *, progress: bool = False) -> Floats:
-    """The distance from a camera to what each pixel's centre shows, (height, width) float64; inf where that is nothing.
+    """The distance from a camera to the surface at the centre of each pixel, along the ray.
 
-    Along the ray, as ``Image.depth`` of a picture has it, and with its bits; not along the camera's axis.
+    Parameters
+    ----------
+    octree : Octree or BruteForce
+    camera : PerspectiveCamera or OrthographicCamera
+        Or anything with a method ``rows(width, height)`` as theirs, which returns an array (6, 3).
+    width, height : int
+        The size in pixels, from 1 to 2^16.
+    progress : bool, default False
+        Show a bar on standard error if that is a terminal.
 
-    camera         a ``PerspectiveCamera``, an ``OrthographicCamera``, or anything with their ``rows``, (6, 3)
-    width, height  pixels, 1 to 2^16
+    Returns
+    -------
+    ndarray of float64, shape (height, width)
+        In scene units; inf where the ray hits nothing. The distance is along the ray, not along the axis of the
+        camera. It has the bits of ``Image.depth``.
 
-    Raises ``ValueError`` naming the argument.
+    Raises
+    ------
+    ValueError
+        If an argument is not as above.
 
+    Examples
+    --------
     >>> from renderer import Octree, PerspectiveCamera
     >>> from renderer.mesh.shapes import box
     >>> from renderer.studies import depth_map
@@ -123,7 +174,7 @@ def depth_map(octree: Queries, camera: Camera, width: int, height: int, *, progr
     >>> depth_map(Octree.from_mesh(box()), camera, 3, 1)
     array([[inf,  2., inf]])
     """
-    _expect_octree(octree)
+    expect_octree(octree)
     width, height = count_argument("width", width, 1, 1 << 16), count_argument("height", height, 1, 1 << 16)
     expect(callable(getattr(camera, "rows", None)), "camera", "a camera", type(camera).__name__)
     rows, depth = _rows_of(camera, width, height), np.empty((height, width))
@@ -149,20 +200,42 @@ def scan(
     pattern: Pattern | ArrayLike | int = 100_000,
     *,
     normal: ArrayLike | None = None,
-    distance: float = np.inf,
+    max_distance: float = np.inf,
     progress: bool = False,
+    distance: float | None = None,
 ) -> Scan:
-    """The point cloud that a scanner at ``origin`` (3,) measures, without noise: the first hit of each ray.
+    """The point cloud that a scanner measures, without noise: the first hit of each ray.
 
-    pattern   directions (k, 3) of any length, a ``directions.Pattern`` of them, or their number, 1 to 2^24, for
-              ``directions.fibonacci_sphere``
-    normal    (3,), for a scanner on the surface: it stands on this side. None: on the outer side by the winding of the
-              face that it stands on
-    distance  how far the scanner reaches, in scene units
+    Parameters
+    ----------
+    octree : Octree or BruteForce
+    origin : array_like, shape (3,)
+        Where the scanner stands.
+    pattern : Pattern, array_like of shape (k, 3), or int, default 100_000
+        The directions of the rays, of any length; or their number, 1 to 2^24, for `fibonacci_sphere`.
+    normal : array_like, shape (3,), optional
+        For a scanner on the surface: it stands on this side. By default it stands on the outer side of its face,
+        from which the corners run counter-clockwise.
+    max_distance : float, default inf
+        How far the scanner reaches, in scene units.
+    progress : bool, default False
+        Show a bar on standard error if that is a terminal.
+    distance : float, optional
+        The former name of `max_distance`.
 
-    A ray of a scanner on the surface that leads through the surface meets it at a distance of 0. Raises ``ValueError``
-    naming the argument.
+    Returns
+    -------
+    Scan
+        Without the rays that hit nothing. If the scanner stands on the surface, a ray that leads through it hits it
+        at a distance of 0.
 
+    Raises
+    ------
+    ValueError
+        If an argument is not as above.
+
+    Examples
+    --------
     >>> from renderer import Octree
     >>> from renderer.mesh.shapes import box
     >>> from renderer.studies import scan
@@ -170,10 +243,10 @@ def scan(
     >>> cloud.points, cloud.distances, cloud.rays
     (array([[0.5 , 0.25, 1.  ]]), array([2.]), array([0]))
     """
-    _expect_octree(octree)
+    expect_octree(octree)
     place = _one_place("origin", origin, octree)
     directions = _directions(pattern)
-    reach = limits_of(distance, directions)
+    reach = limits_of(check_reach(max_distance, distance), directions)
     towards = None if normal is None else _one_direction("normal", normal)
     parts: list[Scan] = []
     with progress_bar(len(directions), "ray", flag_argument("progress", progress)) as update:
@@ -214,10 +287,6 @@ def _row_on_side(octree: Queries, face: int, code: int, anchor: Floats, normal: 
     return row
 
 
-def _expect_octree(octree: Queries) -> None:
-    expect(isinstance(octree, Queries), "octree", "an Octree or a BruteForce", type(octree).__name__)
-
-
 def _one_place(argument: str, place: ArrayLike, octree: Queries) -> Floats:
     rows, shape = check_points(argument, place, farthest_of(octree.tree.scale))
     expect(shape == (), argument, "shape (3,)", f"shape {(*shape, 3)}")
@@ -230,7 +299,7 @@ def _one_direction(argument: str, direction: ArrayLike) -> Floats:
 
 
 def _rows_of(camera: Camera, width: int, height: int) -> Floats:
-    """A camera's affine map. Raises ``ValueError`` where it is none."""
+    """A camera's affine map."""
     expected = "rows(width, height) of shape (6, 3), finite"
     try:
         given = camera.rows(width, height)

@@ -1,8 +1,8 @@
 """Child Python processes that import packages from the same places as this one.
 
 ``python -c`` and ``python -m`` put the current folder first on the path: a file ``renderer.py`` or ``numpy.py`` beside
-a downloaded scene would be executed. A child runs this file by its path, without that folder, and loads the very
-packages that its parent has.
+a downloaded scene would be executed. A child runs this file by its path, without that folder, and loads the same
+packages as its parent.
 """
 
 import os
@@ -15,12 +15,12 @@ _OUR_PACKAGES = ("renderer", "validation")
 
 
 def command(target: str, *arguments: str) -> list[str]:
-    """The command of a process that calls ``target``, such as "renderer.cli.main:main", with strings."""
+    """The command of a process that calls ``target``, such as "renderer.cli.main:main", with string arguments."""
     return [sys.executable, "-P", str(Path(__file__).resolve()), target, *arguments]
 
 
 def environment(**more: str) -> dict[str, str]:
-    """This process's environment for a child, without relative paths to import from."""
+    """This process's environment for a child, without relative import paths."""
     own = {**os.environ, **more}
     if "PYTHONPATH" in own:
         absolute = [entry for entry in own["PYTHONPATH"].split(os.pathsep) if os.path.isabs(entry)]
@@ -39,7 +39,7 @@ def _call(target: str, *arguments: str) -> object:
 
 
 def load_package(name: str, folder: Path) -> None:
-    """Import the package in ``folder`` as ``name``, whatever the path would find under that name."""
+    """Import the package in ``folder`` as ``name``, whatever the import path has under that name."""
     spec = spec_from_file_location(name, folder / "__init__.py", submodule_search_locations=[str(folder)])
     assert spec is not None and spec.loader is not None  # the file is there
     module = module_from_spec(spec)

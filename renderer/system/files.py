@@ -1,4 +1,4 @@
-"""Files written whole or not at all."""
+"""Atomic writing of files."""
 
 import errno
 import os
@@ -20,8 +20,8 @@ _RANDOM = 12
 
 
 def as_path(argument: str, value: object) -> Path:
-    """A path given as a string or path; ``ValueError`` that names the argument for anything else, or for a name that
-    no file can have.
+    """A path given as a string or path. ``ValueError`` names the argument for anything else, or for an impossible file
+    name.
     """
     if not isinstance(value, str | os.PathLike) or isinstance(os.fspath(value), bytes):
         raise ValueError(f"{argument}: expected a string or path, got {type(value).__name__}")
@@ -36,10 +36,10 @@ def as_path(argument: str, value: object) -> Path:
 
 
 def write_atomically(path: str | os.PathLike[str], write: Callable[[BinaryIO], object]) -> None:
-    """Let ``write`` fill a temporary file beside ``path``, then rename it: never a half-written file.
+    """Have ``write`` fill a temporary file beside ``path``, then rename it: never a half-written file.
 
     A symbolic link is followed, and a device or pipe is written to. An ``OSError`` names ``path``, whatever failed.
-    Temporary files that killed processes left of the same file are removed.
+    Temporary files of the same target, left by killed processes, are removed.
     """
     with _temporary_beside(path) as (temporary, target):
         if is_special(target):
@@ -67,7 +67,7 @@ def read_whole(path: Path) -> bytes:
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
-    """Raise the ``OSError`` of ``write_atomically``, as far as can be told before there is anything to write."""
+    """Raise the ``OSError`` of ``write_atomically``, as far as it is known before there is anything to write."""
     with _temporary_beside(path) as (temporary, target):
         with suppress(FileNotFoundError):
             target.lstat()  # a name too long, which some versions of Python take for no folder
@@ -79,8 +79,8 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 
 def are_apart(written: Iterable[str | os.PathLike[str]], read: Iterable[str | os.PathLike[str]] = ()) -> bool:
-    """Whether the files behind ``written`` are all different and none is one of those behind ``read``, whatever links
-    lead there.
+    """Whether the files behind ``written`` are all different and none is one of those behind ``read``, through any
+    links.
     """
     # Not Path.resolve, which raises a RuntimeError for links in a circle.
     outputs = [os.path.realpath(path) for path in written]
@@ -89,9 +89,10 @@ def are_apart(written: Iterable[str | os.PathLike[str]], read: Iterable[str | os
 
 @contextmanager
 def _created(temporary: Path) -> Iterator[BinaryIO]:
-    """A new file, locked until the context ends, also when it is closed before: so others see that its writer lives.
+    """A new file, locked until the context ends, even if it is closed earlier, so that others see that its writer
+    lives.
 
-    The lock of a process ends with it, however that ends.
+    A lock ends with its process, however that ends.
     """
     while True:
         with open(temporary, "xb") as file:
@@ -118,7 +119,7 @@ def _is_at(path: Path, descriptor: int) -> bool:
 
 
 def _remove_left(target: Path) -> None:
-    """Remove the temporary files of ``target`` whose writers are gone: those that nobody has locked."""
+    """Remove the temporary files of ``target`` whose writers are gone: those without a lock."""
     if fcntl is None:
         return
     name = re.compile(f"{re.escape(_beginning(target))}[0-9a-f]{{{_RANDOM}}}")
@@ -129,7 +130,7 @@ def _remove_left(target: Path) -> None:
 
 
 def _remove_unlocked(path: Path) -> None:
-    """Remove a file. Raises ``OSError`` where it is locked, or on a file system that has no locks."""
+    """Remove a file. Raises ``OSError`` if it is locked, or on a file system without locks."""
     if S_ISREG(path.lstat().st_mode):
         descriptor = os.open(path, os.O_RDWR)
         try:
@@ -141,12 +142,12 @@ def _remove_unlocked(path: Path) -> None:
 
 
 def _beginning(target: Path) -> str:
-    """The beginning of temporary files' names: a name has at most 255 bytes, a character up to four."""
+    """The start of temporary files' names: a name has at most 255 bytes, a character up to four."""
     return f".{target.name[:60]}."
 
 
 def is_special(path: Path) -> bool:
-    """Whether it is a pipe, which may have no writer, or a device, which may have no end."""
+    """Whether it is a pipe, which may have no writer, or a device, which may be endless."""
     return path.exists() and not (path.is_file() or path.is_dir())
 
 

@@ -33,6 +33,9 @@ def interruptible(message: str) -> Callable[[Command], Command]:
                 with _ends_clean(ended_by, own_process), ends_while_compiling(message, own_process):
                     code = command(arguments)
             except KeyboardInterrupt:
+                # Another Ctrl-C, as where Python waits for a thread that compiles, ends the process at once.
+                if own_process and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+                    signal.signal(signal.SIGINT, signal.SIG_DFL)
                 if not ended_by:
                     print(message, file=sys.stderr)
             if ended_by:

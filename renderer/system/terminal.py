@@ -8,15 +8,15 @@ from io import TextIOWrapper
 
 
 def on_terminal() -> bool:
-    """Whether standard error is a terminal; it may be closed, too, or replaced."""
+    """Whether standard error is a terminal; it may also be closed or replaced."""
     return sys.stderr is not None and sys.stderr.isatty()
 
 
 @contextmanager
 def progress_bar(count: int, unit: str, progress: bool) -> Iterator[Callable[[int], object] | None]:
-    """The function to call with the number of units done: that of a bar, or None where no terminal shows it.
+    """The function to call with the number of units done, or None without a terminal.
 
-    There is no hidden bar in place of None, because all bars share a lock, which Ctrl-C may leave taken for good.
+    None, not a hidden bar, because all bars share a lock that Ctrl-C may leave locked for ever.
     """
     if not (progress and on_terminal()):
         yield None
@@ -28,19 +28,19 @@ def progress_bar(count: int, unit: str, progress: bool) -> Iterator[Callable[[in
 
 
 def spell_everything() -> None:
-    """Let standard output escape characters that its encoding lacks, as an accent in a path, where it would raise."""
+    """Make standard output escape characters that its encoding lacks, such as accents in a path, instead of raising."""
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
 
 
 def say(line: str, *, flush: bool = False) -> None:
-    """Print a line on standard output. Raises ``OSError`` naming it, as where it is a file on a full disk."""
+    """Print a line on standard output. Raises ``OSError`` naming it, for instance on a full disk."""
     with _naming_output():
         print(line, flush=flush)
 
 
 def give_up_output() -> None:
-    """Let what is still to be printed go nowhere: it would be tried, and fail, again when the process ends."""
+    """Discard pending output: at the end of the process writing it would fail again."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

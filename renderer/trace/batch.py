@@ -1,13 +1,15 @@
 """Batches of rays as queries get them: shapes and bounds are checked, and starts are moved off their faces."""
 
 import math
+from collections.abc import Mapping
 from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from renderer.arguments.arrays import real_argument
 from renderer.arguments.limits import FARTHEST, LONGEST, SHORTEST
+from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.system.threads import for_chunks
@@ -39,12 +41,9 @@ def _doubles(array: NDArray[Any]) -> NDArray[np.float64]:
         return np.require(array, np.float64, ("C_CONTIGUOUS", "WRITEABLE"))
 
 
-def _bound(argument: str, value: ArrayLike, shape: tuple[int, ...], largest: float) -> NDArray[np.float64]:
+def _bound(argument: str, given: NDArray[Any], shape: tuple[int, ...], largest: float) -> NDArray[np.float64]:
     """One bound for all rays or one per ray, from 0 to ``largest``, as a (1,) or (n,) array."""
-    array = real_argument(argument, value)
-    fits = array.ndim == 0 or array.shape == shape
-    expect(fits, argument, f"a number or shape {shape}", f"shape {array.shape}")
-    array = _doubles(array.reshape(-1))
+    array = _doubles(given.reshape(-1) if given.ndim == 0 else np.broadcast_to(given, shape).reshape(-1))
     good = (array >= 0.0) & (array <= largest)
     if not good.all():
         row = int((~good).argmax())
@@ -82,29 +81,53 @@ class RayBatch(NamedTuple):
 
 
 _ZERO, _INFINITY = np.zeros(1), np.full(1, np.inf)
+NO_SHAPES: Mapping[str, tuple[int, ...]] = {}
 
 
 def check_rays(
-    origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike, t_max: ArrayLike
+    origins: ArrayLike,
+    directions: ArrayLike,
+    t_min: ArrayLike,
+    t_max: ArrayLike,
+    starts: Mapping[str, tuple[int, ...]] = NO_SHAPES,
 ) -> tuple[RayBatch, tuple[int, ...]]:
-    """A batch whose shapes, types and bounds are checked, and the leading dimensions of origins and directions.
+    """A batch whose shapes, types and bounds are checked, and the shape of its rays: that of all arguments together.
 
-    Whether each ray is in range is checked when it is traced. Raises ``ValueError`` naming the argument and, for a bad
-    bound, its row.
+    ``starts`` has the shapes of ``leaving`` and ``side``. Whether each ray is in range is checked when it is traced.
+    Raises ``ValueError`` naming the argument and, for a bad bound, its row.
     """
     origins, directions = _vectors("origins", origins), _vectors("directions", directions)
-    if origins.shape == directions.shape and origins.ndim == 2 and origins.strides[0] and directions.strides[0]:
-        shape: tuple[int, ...] = (len(origins),)
-    else:
-        shape = broadcast_shape("directions", directions, "origins", origins)
+    # The usual bounds share arrays.
+    low = None if type(t_min) is float and t_min == 0.0 else real_argument("t_min", t_min)
+    high = None if type(t_max) is float and t_max == np.inf else real_argument("t_max", t_max)
+    alike = origins.shape == directions.shape and origins.ndim == 2 and origins.strides[0] and directions.strides[0]
+    shape = (len(origins),) if alike else broadcast_shape("directions", directions, "origins", origins)
+    joint = shape if low is None and high is None and not starts else _joint(shape, low, high, starts)
+    if not alike or joint != shape:
+        shape = joint
         origins, directions = _rows(origins, shape), _rows(directions, shape)
         if len(origins) == len(directions) == 1 != math.prod(shape):
             # One of them says how many rays there are.
             directions = np.broadcast_to(directions, (math.prod(shape), 3))
-    # The usual bounds share arrays.
-    low = _ZERO if type(t_min) is float and t_min == 0.0 else _bound("t_min", t_min, shape, _MOST)
-    high = _INFINITY if type(t_max) is float and t_max == np.inf else _bound("t_max", t_max, shape, np.inf)
-    return RayBatch(_doubles(origins), _doubles(directions), low, high), shape
+    return RayBatch(
+        _doubles(origins),
+        _doubles(directions),
+        _ZERO if low is None else _bound("t_min", low, shape, _MOST),
+        _INFINITY if high is None else _bound("t_max", high, shape, np.inf),
+    ), shape
+
+
+def _joint(
+    shape: tuple[int, ...],
+    low: NDArray[Any] | None,
+    high: NDArray[Any] | None,
+    starts: Mapping[str, tuple[int, ...]],
+) -> tuple[int, ...]:
+    """The shape of rays together with those of their bounds and starts."""
+    bounds = {name: () if bound is None else bound.shape for name, bound in (("t_min", low), ("t_max", high))}
+    for argument, other in {**bounds, **starts}.items():
+        shape = joint_shape(argument, other, shape, "that of the rays")
+    return shape
 
 
 def broadcast_shape(argument: str, values: NDArray[Any], other: str, others: NDArray[Any]) -> tuple[int, ...]:
@@ -114,6 +137,15 @@ def broadcast_shape(argument: str, values: NDArray[Any], other: str, others: NDA
     except ValueError:
         expected = f"a shape that goes with that of {other}, {others.shape}"
         expect(False, argument, expected, f"shape {values.shape}")
+        raise
+
+
+def joint_shape(argument: str, shape: tuple[int, ...], others: tuple[int, ...], of: str) -> tuple[int, ...]:
+    """The shape of an argument that has a value a ray, or a point, and of those together."""
+    try:
+        return np.broadcast_shapes(shape, others)
+    except ValueError:
+        expect(False, argument, f"a number or a shape that goes with {of}, {others}", f"shape {shape}")
         raise
 
 
@@ -137,19 +169,28 @@ def _is_plain(values: ArrayLike) -> TypeGuard[NDArray[np.float64]]:
 
 
 def check_faces(argument: str, faces: ArrayLike, shape: tuple[int, ...], most: int) -> NDArray[np.int64]:
-    """Faces, -1 for none, one for all of some rays or one for each, as an array (n,) of its own.
+    """Faces, -1 for none, broadcast to rays of some shape, as an array (n,) of its own.
 
     Raises ``ValueError`` naming the argument and, for a face beyond the last of ``most``, its row.
     """
-    array = real_argument(argument, faces)
-    whole = array.dtype.kind in "iu" and (array.ndim == 0 or array.shape == shape)
-    expect(whole, argument, f"an integer or integers of shape {shape}", f"{array.dtype} of shape {array.shape}")
     # A copy, which no other thread can change once it is checked.
-    rows: NDArray[np.int64] = np.array(np.broadcast_to(array, shape), np.int64).reshape(-1)
+    rows = np.array(whole_numbers(argument, faces, shape), np.int64).reshape(-1)
     good = (rows >= -1) & (rows < most)
     if not good.all():
         row = int((~good).argmax())
         expect(False, argument, f"faces from 0 to {most - 1}, or -1", f"{rows[row]} in row {row}")
+    return rows
+
+
+def whole_numbers(argument: str, values: ArrayLike, shape: tuple[int, ...]) -> NDArray[Any]:
+    """Integers as an array broadcast to a shape. Raises ``ValueError`` naming the argument."""
+    array = real_argument(argument, values)
+    try:
+        rows = np.broadcast_to(array, shape)
+        fits = array.dtype.kind in "iu"
+    except ValueError:
+        rows, fits = array, False
+    expect(fits, argument, f"an integer or integers of shape {shape}", f"{array.dtype} of shape {array.shape}")
     return rows
 
 

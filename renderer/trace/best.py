@@ -1,4 +1,4 @@
-"""Hits as kernels pass them: the best one of a search, and one on a face that is known."""
+"""Hits inside kernels: the best hit of a search, and a hit on a known face."""
 
 from typing import NamedTuple
 
@@ -19,8 +19,8 @@ class FaceHit(NamedTuple):
 
 
 class Best(NamedTuple):
-    """The best hit of a search so far: the smallest t, then the lowest face. NO_FACE says that there is none, and t how
-    far the search goes. The barycentrics are u / w and v / w; only those of the final hit are divided.
+    """The best hit of a search so far: the smallest t, then the lowest face. NO_FACE means none; t is then the limit of
+    the search. The barycentrics are u / w and v / w; only those of the final hit are divided.
     """
 
     t: float
@@ -44,5 +44,5 @@ def hit_on(face, hit):
 
 @inlined
 def is_better(t, face, t_min, best):
-    """Whether a hit counts and is before the best one: a smaller t, or a lower face."""
+    """Whether a hit counts and comes before the best one: a smaller t, or the same t and a lower face."""
     return t >= t_min and (t < best.t or (t == best.t and face < best.face))

@@ -68,9 +68,7 @@ def _trace_few(tree: Tree, rays: RayBatch) -> NDArray[np.float64]:
 
 
 def rays_against_blocks(tree: Tree) -> int:
-    """The number of rays in a chunk of brute force: some 10 ms of work, so that Ctrl-C and other threads need not wait
-    for long.
-    """
+    """The number of rays in a chunk of brute force: some 10 ms of work, so that Ctrl-C need not wait."""
     return max(1, _BLOCK_TESTS * BLOCK_FACES // max(1, len(tree.faces)))
 
 
@@ -111,7 +109,7 @@ def _run(tree: Tree, rays: RayBatch, out: NDArray[np.float64], threads: int, any
 
 
 class _Local(threading.local):
-    """Scratch in which a thread traces its next chunk, kept from the last one: 100 kB are used."""
+    """The scratch of a thread, kept from one chunk to the next: 100 kB."""
 
     scratch: Scratch | None = None
 
@@ -120,7 +118,7 @@ _local = _Local()
 
 
 def _take_scratch(depth: int) -> Scratch:
-    """The thread's scratch, or new: taken, because a handler of a signal may trace rays while a chunk is half done."""
+    """The thread's scratch, or a new one. It is taken away, because a signal handler may trace rays during a chunk."""
     scratch, _local.scratch = _local.scratch, None
     if scratch is None or scratch.stack_size < stack_size(depth):
         scratch = new_scratch(depth, CHUNK)

@@ -1,7 +1,7 @@
-"""On which side of a face's edges a ray passes, exactly: decides where rounding leaves an edge function 0.
+"""Exact signs of edge functions, for those that rounding leaves 0.
 
 Sheared, a corner's place depends on the ray and the corner alone. So the faces of a mesh are a planar map that the ray
-passes at one point, and with exact signs it meets exactly the faces whose closed outlines hold that point.
+passes at one point, and with exact signs it hits exactly the faces whose closed outlines contain that point.
 """
 
 from typing import NamedTuple
@@ -37,7 +37,7 @@ def corners_at(tree, at):
 
 
 class EdgeSides(NamedTuple):
-    """On which side of each edge of a face a ray passes, -1, 0 or 1: of the edge opposite to each corner."""
+    """The side on which a ray passes each edge of a face: -1, 0 or 1, for the edge opposite to each corner."""
 
     opposite0: int
     opposite1: int
@@ -57,7 +57,7 @@ def exact_sides(tree, at, shear):
 
 @kernel
 def passes_within(sides):
-    """Whether a ray that passes the edges on these sides meets the closed face. In its plane it does not."""
+    """Whether a ray that passes the edges on these sides hits the closed face; false for a ray in its plane."""
     a, b, c = sides.opposite0, sides.opposite1, sides.opposite2
     same = (a >= 0 and b >= 0 and c >= 0) or (a <= 0 and b <= 0 and c <= 0)
     return same and (a != 0 or b != 0 or c != 0)
@@ -101,7 +101,7 @@ def _sign(x):
 
 @kernel
 def _parts(x):
-    """|x| as a number from 1 to 2, and a power of two."""
+    """|x| as a number from 1 to 2, and the power of two to multiply it by."""
     x, less = abs(x), 0
     if x < _SMALL:
         x, less = x * _SCALE, _SCALE_BITS

@@ -1,4 +1,4 @@
-"""Sets the bounds of the errors of t of a query's hits; ``error_bounds`` finds them."""
+"""Sets ``t_error`` of the hits of a query; ``error_bounds`` computes the bounds."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +12,10 @@ from renderer.trace.error_bounds import bound_errors
 def add_errors(
     hits: Hits | AllHits, rays: RayBatch, rows: NDArray[np.int64] | None, scale: float, threads: int
 ) -> None:
-    """Set ``hits.t_error``: how far t may be from where each hit's ray meets its face.
+    """Set ``hits.t_error``, the bound of the error of each t.
 
-    A ray nearly in its plane may pass it by and meet the plane elsewhere: then the bound holds for where the ray is
-    within the face's box.
-    ``rows`` are the rays of the hits; None says that each ray has a row of its own. ``scale`` is the tree's.
+    A ray nearly in a face's plane may hit by rounding alone. The bound then holds for the ray's interval inside the
+    face's box. ``rows`` are the rays of the hits; None: one hit a ray. ``scale`` is the tree's.
     """
     mesh, errors = hits._mesh, np.empty(len(hits.t))
     own = np.empty(0, np.int64) if rows is None else rows

@@ -1,9 +1,8 @@
-"""Bounds of the errors of t, for each hit from its own ray and face, found once t is known.
+"""Bounds of the errors of t, computed from ray and face once t is known.
 
-They do not follow how t came about. What t leaves of the equation of the face's plane is computed with twice the
-digits; divided by the plane's slope along the ray it is how far t is from the plane. Where rounding may have made that
-slope, as of faces so thin that their area is lost and of rays along a face, the face's box bounds the error: the ray
-meets the face within it.
+They do not depend on the way t was computed. The residual of t in the equation of the face's plane is computed with
+twice the digits. Divided by the plane's slope along the ray it is the distance of t from the plane. If rounding could
+decide that slope, as for very thin faces and rays along a face, the face's box bounds the error.
 """
 
 import numpy as np
@@ -67,16 +66,16 @@ def bound_errors(vertices, faces, rays, rows, t, face, errors, begin, end, unit)
 
 @inlined
 def _off(o, slack):
-    """How far a ray's origin o is from its start on the surface at most, along each axis: from an edge it is rounded,
-    else moved by less than the slack; from a corner it starts exactly.
+    """The largest distance of a ray's origin o from its start on the surface, along each axis. From a corner it is 0,
+    from an edge a rounding, else less than the slack.
     """
     return slack_of(o, 0.0) if slack == EDGE else (0.0 if slack == CORNER else slack)
 
 
 @kernel
 def _plane_error(p0, p1, p2, o, d, t, off):
-    """How far t may be from where a ray meets a face's plane, inf where rounding may have made that. The ray may start
-    ``off`` its origin.
+    """The bound of the error of t against a face's plane; inf if rounding could decide the plane's slope. The ray may
+    start ``off`` its origin.
 
     With n the plane's normal, t is off by (n . (p0 - o) - t n . d) / (n . d). Sides, distances and the direction are
     scaled by powers of two to less than 4, so that no product overflows.
@@ -107,16 +106,17 @@ def _sizes(a):
 
 @inlined
 def _cross_sizes(a, b):
-    """For each component of a vector product the sizes of its two products together; a and b without signs."""
+    """For each component of a cross product, the sum of the sizes of its two products; a and b are without signs."""
     return a[1] * b[2] + a[2] * b[1], a[2] * b[0] + a[0] * b[2], a[0] * b[1] + a[1] * b[0]
 
 
 @kernel
 def _box_error(q0, q1, q2, d, t, off):
-    """How far t may be from where a ray meets a face, whose corners are relative to the origin, by the face's box.
+    """The bound of the error of t by the face's box; corners are relative to the origin.
 
-    The box is wider than the face by ROOM, so that a ray that passes a face by only by rounding meets its plane within,
-    if it is not nearly in the plane. Where it passes the box by, the box's planes across its longest component count.
+    The box is wider than the face by ROOM. So a ray that misses a face by rounding only meets its plane inside the box,
+    unless it is nearly in the plane. If it misses the box, the box's planes across the direction's longest component
+    count.
     """
     largest, first, last, before, behind = 0.0, -np.inf, np.inf, -np.inf, np.inf
     for k in range(3):
@@ -132,7 +132,7 @@ def _box_error(q0, q1, q2, d, t, off):
 
 @inlined
 def _meet_slab(low, high, d):
-    """From which t to which a ray from 0 may be between two planes, or ROOM beside them."""
+    """The range of t in which a ray from 0 may be between two planes, or ROOM beside them."""
     room = (high - low) * ROOM + _LEAST
     low, high = low - (room + abs(low) * _ROUNDED), high + (room + abs(high) * _ROUNDED)
     if d == 0.0:

@@ -49,7 +49,7 @@ _MORE = np.float32(1.0 + 2.0**-9)
 # around its face, and ``resolve_uncertain`` moves the others there: the answer is the least t over all faces, whatever
 # the tree, the packet or the order.
 DOUBT = 2.0**-27
-# SLANT for the determinant, as a share of A D S / Z: thin faces, and faces met at small angles, are below it. A hit is
+# SLANT for the determinant, as a share of A D S / Z: thin faces, and faces hit at small angles, are below it. A hit is
 # a mean of the corners, so its distance from the plane is 9 u A D S over twice the face's area. Above the limit that is
 # 9 sqrt(3) u Z / SLANT, because no determinant exceeds sqrt(3) times twice the area. Let L be the largest component of
 # a corner relative to the origin. Z is at most 3 L, so the distance is at most 47 u L / SLANT, less than 2^-31 L.
@@ -94,8 +94,7 @@ def room_of(slack):
 
 @inlined
 def round_both(x, room):
-    """A float32 <= x and one >= x, with the room of ``room_of`` beside it; each is within three ulp of that or
-    infinite, but never on the wrong side.
+    """A float32 <= x - room and one >= x + room. Each is within three ulp or infinite, never on the wrong side.
 
     The least float32 is never above +inf nor the greatest below -inf, so no difference with either is NaN.
     """
@@ -119,14 +118,14 @@ def face_range(a, b, c):
 
 @inlined
 def box_limit(t, largest):
-    """The float32 distance that bounds a search for hits up to t: a box that is entered later holds none."""
+    """The float32 distance that bounds a search for hits up to t: a box entered later contains none."""
     return round_up(t * largest) * FAR_PADDING
 
 
 class Ray(NamedTuple):
     """One ray, or eight as vectors: origin, direction, the least t that counts, and how it starts on the surface.
 
-    slack    how far the origin may be from the start on the surface, with room; 0 where it starts on none
+    slack    bound of the distance of the origin from the start on the surface, with room; 0 if it starts on none
     leaving  the face that it starts on, as float64; -1 for none
     """
 
@@ -213,7 +212,7 @@ def enter_boxes(nodes, node, slabs, lower, upper):
 
 @inlined
 def meet_boxes(nodes, node, slabs, lower, upper):
-    """Entry distances (8 x float32), and the mask of the octants that the ray meets within [lower, upper].
+    """Entry distances (8 x float32), and the mask of the octants that the ray enters within [lower, upper].
 
     A distance is NaN where the direction is 0 and the origin lies in a slab's plane. Each comparison is false for NaN,
     so the interval stays as it was.
@@ -317,7 +316,7 @@ class Edges(NamedTuple):
 
 @inlined
 def load_corners(tree, base, rows):
-    """The nine rows of a block, x, y and z of each corner, in the order of axes that ``rows`` has as row_x to row_z."""
+    """The nine rows of a block: x, y and z of each corner, in the order of axes row_x, row_y, row_z of ``rows``."""
     return _load_rows(tree.wide_blocks, base, rows) if tree.wide != 0 else _load_rows(tree.blocks, base, rows)
 
 
@@ -336,9 +335,9 @@ def see_triangles(tree, base, ray):
     """The ``Edges`` of a block's four triangles, and the bits of those whose edges a ray passes on the same side.
 
     Source: Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, JCGT 2:1, 2013. fl(ab) - fl(cd) has the sign of
-    ab - cd or is 0. 0 counts as inside here. Where rounding may have made it the hit is uncertain, and ``edge_signs``
-    decides exactly. A triangle whose corners lie on a line may be hit: it fills the slit that its neighbours' rounded
-    edges leave.
+    ab - cd or is 0. 0 counts as inside here. If rounding could have made that 0, the hit is uncertain and
+    ``edge_signs`` decides. A triangle whose corners lie on a line may be hit: it fills the slit between its neighbours'
+    rounded edges.
     """
     x0, x1, x2, y0, y1, y2, z0, z1, z2 = load_corners(tree, base, ray)
     zero, ox, oy, oz = splat4(0.0), splat4(ray.origin_x), splat4(ray.origin_y), splat4(ray.origin_z)
@@ -356,7 +355,7 @@ def see_triangles(tree, base, ray):
 
 
 class _Sizes(NamedTuple):
-    """Sums of what the corners of four triangles are without signs, as a ray sees them: of x, of y, of both, of z."""
+    """Sums of the sizes of the sheared corners of four triangles: of x, of y, of both, of z."""
 
     wide: Any
     high: Any
@@ -378,13 +377,13 @@ def _numerator(edges):
 
 
 class PlaneHits(NamedTuple):
-    """Where a ray meets the planes of a block's four triangles, and the bits of those for which rounding matters.
+    """t for the planes of a block's four triangles, and the bits of those that rounding could decide.
 
     t                      of each triangle
-    uncertain              rounding may have made t, or an edge function
-    determinant_uncertain  rounding may have made the determinant
-    must_resolve           uncertain, and may be hit from t_min to t_max once that is resolved; or near the start of a
-                           ray that leaves a surface. Never the face that it leaves
+    uncertain              rounding could decide t or an edge function
+    determinant_uncertain  rounding could decide the determinant
+    must_resolve           uncertain, and may fall in [t_min, t_max] once resolved; or near the start of a ray that
+                           leaves a surface. Never the face that it leaves
     """
 
     t: Any
@@ -395,7 +394,7 @@ class PlaneHits(NamedTuple):
 
 @inlined
 def meet_planes(tree, base, edges, seen, ray, t_min, t_max):
-    """The ``PlaneHits`` of the triangles of the block at ``base``; only those ``seen`` have bits."""
+    """The ``PlaneHits`` of the block at ``base``; only triangles in ``seen`` have bits."""
     sizes, numerator = _sizes_of(edges), _numerator(edges)
     denominator = edges.determinant * splat4(ray.direction_z)
     t, height = numerator / denominator, fabs(numerator)
@@ -429,8 +428,8 @@ def meet_planes(tree, base, edges, seen, ray, t_min, t_max):
 
 @inlined
 def _left(tree, base, edges, ray):
-    """The bits of the faces of the block at ``base`` that a ray leaves: its own, and where it starts at a corner those
-    that have it, which it meets nowhere else.
+    """The bits of the faces of the block at ``base`` that a ray leaves: its own face, and at a corner all faces with
+    that corner, which it cannot hit elsewhere.
     """
     slot, bits = base // BLOCK_WORDS * BLOCK_FACES, np.int64(0)
     for i in range(BLOCK_FACES):
@@ -445,8 +444,8 @@ def _left(tree, base, edges, ray):
 
 @inlined
 def _is_extended(edges, sizes):
-    """The mask of triangles that a ray does not see as a point or as a piece of an axis: it meets none of these. They
-    are found here, because rays along walls would all be uncertain.
+    """The mask of triangles that the ray does not see as a point or as a piece of an axis. It hits none of those;
+    without this check, rays along walls would all be uncertain.
     """
     zero = splat4(0.0)
     apart = (edges.x0 != edges.x1) | (edges.x1 != edges.x2) | (edges.y0 != edges.y1) | (edges.y1 != edges.y2)
@@ -455,7 +454,7 @@ def _is_extended(edges, sizes):
 
 @inlined
 def _may_be_on_edge(edges):
-    """The mask of triangles with an edge function that is 0 as rounded, though its products are not."""
+    """The mask of triangles with an edge function that is 0 only after rounding."""
     zero, e0, e1, e2 = splat4(0.0), edges.e0, edges.e1, edges.e2
     x0, x1, x2 = edges.x0 != zero, edges.x1 != zero, edges.x2 != zero
     y0, y1, y2 = edges.y0 != zero, edges.y1 != zero, edges.y2 != zero
@@ -467,7 +466,7 @@ def _may_be_on_edge(edges):
 
 @inlined
 def near_planes(edges, slack):
-    """The bits of the triangles whose planes are within a ray's ``slack`` of its origin, or of rounding."""
+    """The bits of the triangles whose planes are within a ray's ``slack``, or a rounding, of its origin."""
     sizes, height = _sizes_of(edges), fabs(_numerator(edges))
     error = splat4(slack) + sizes.along * splat4(ERROR)
     return movemask(height <= sizes.across * (sizes.across + sizes.along) * error)
@@ -475,7 +474,7 @@ def near_planes(edges, slack):
 
 @inlined
 def unsure_sides(edges, slack):
-    """The bits of the triangles of which a ray may pass an edge on either side, if its origin is off by ``slack``.
+    """The bits of the triangles with an edge that the ray may pass on either side, if its origin is off by ``slack``.
 
     With D as above a sheared coordinate errs by 4 u D and the slack, so an edge function by 2 A times that and 2 u A^2.
     """
@@ -486,8 +485,8 @@ def unsure_sides(edges, slack):
 
 
 class BlockHits(NamedTuple):
-    """What one ray hits of the four triangles of a block: the bits of those hit, those of ``PlaneHits``, t, and the
-    barycentrics' numerators and denominator.
+    """The hits of one ray in a block: the bits of the triangles hit, those of ``PlaneHits``, t, and the numerators and
+    denominator of the barycentrics.
     """
 
     bits: int
@@ -502,7 +501,7 @@ class BlockHits(NamedTuple):
 
 @inlined
 def hit_triangles(tree, base, ray, t_min, t_max):
-    """The ``BlockHits`` of the block at ``base``: a watertight test. ``resolve`` decides about those uncertain."""
+    """The ``BlockHits`` of the block at ``base`` by a watertight test; ``resolve`` decides the uncertain ones."""
     edges, bits = see_triangles(tree, base, ray)
     if bits == 0:
         zero = splat4(0.0)
@@ -516,5 +515,5 @@ def hit_triangles(tree, base, ray, t_min, t_max):
 
 @inlined
 def hit_in(hits, i):
-    """The i-th of some ``BlockHits``, as ``FaceHit``."""
+    """The i-th of ``BlockHits``, as a ``FaceHit``."""
     return FaceHit(extract(hits.t, i), extract(hits.u, i), extract(hits.v, i), extract(hits.w, i))

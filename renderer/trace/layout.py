@@ -41,7 +41,7 @@ NODES, BLOCKS, FACES, BLOCK_COUNT, DEPTH, WIDE, SCALE, TREE_WORDS = range(8)
 
 @dataclass(frozen=True, eq=False)
 class Tree:
-    """A mesh as rays are traced against it: nodes and blocks of triangles.
+    """A mesh for tracing: nodes and blocks of triangles.
 
     nodes   (N * NODE_WORDS,) float32, rounded outwards from the float64 vertices; without nodes, every block is tested
     blocks  (B * BLOCK_WORDS,) float32 when every vertex is exactly a float32, else float64
@@ -58,7 +58,7 @@ class Tree:
 
     @property
     def has_nodes(self) -> bool:
-        """Whether rays go through nodes; else every ray is tested against every block."""
+        """Whether the tree has nodes; if not, every ray is tested against every block."""
         return self.depth > 0
 
     @property
@@ -77,7 +77,7 @@ class Tree:
         return words
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Copies and pickles leave out the addresses, which are those of this object's arrays."""
+        """Copy and pickle without the addresses, which are those of this object's arrays."""
         return _restored, (self.nodes, self.blocks, self.faces, self.depth, self.scale)
 
 
@@ -92,7 +92,7 @@ def _aligned(array: NDArray[Any]) -> NDArray[Any]:
 
 
 def cache_aligned(count: int, dtype: type[np.generic]) -> NDArray[Any]:
-    """An uninitialised array of ``count`` values that begins on a cache line, as every record of 64 bytes then does."""
+    """An uninitialised array of ``count`` values that begins on a cache line, as do all its records of 64 bytes."""
     size = count * np.dtype(dtype).itemsize
     memory = np.empty(size + CACHE_LINE, np.uint8)
     start = -memory.ctypes.data % CACHE_LINE
@@ -100,9 +100,10 @@ def cache_aligned(count: int, dtype: type[np.generic]) -> NDArray[Any]:
 
 
 def locked(array: NDArray[T]) -> NDArray[T]:
-    """A view that cannot be written.
+    """A read-only view.
 
-    Kernels are compiled anew for arrays that cannot, as those of a mapped file. So a kernel gets all of a kind as such.
+    Numba compiles a kernel again for read-only arrays, such as those of a mapped file. So kernels get all arrays of a
+    kind read-only.
     """
     view = array.view()
     view.flags.writeable = False

@@ -73,7 +73,7 @@ def tree_pointers(descriptor):
 
 @inlined
 def octants_around(tree, node, low, high):
-    """The bits of the octants of a node whose boxes reach into the one from corner ``low`` to corner ``high``."""
+    """The bits of the octants of a node whose boxes overlap the box from ``low`` to ``high``."""
     base, bits, room = node * NODE_WORDS, 0xFF, room_of(0.0)
     for k in range(3):
         down, up = round_both(low[k], room)[0], round_both(high[k], room)[1]
@@ -89,9 +89,9 @@ _BLOCKS_AT_ONCE = 16
 
 @inlined
 def nearest_in_blocks(tree, first, count, t_min, shear, best):
-    """The better of ``best`` and the certain hits in ``count`` blocks; and whether an uncertain one must be resolved.
+    """The better of ``best`` and the certain hits in ``count`` blocks, and whether an uncertain hit must be resolved.
 
-    A call here that resolves it would cost every ray its registers, so that is left to ``nearest_carefully``.
+    Resolving it here would cost every ray registers; ``nearest_carefully`` does it.
     """
     t, face, u, v, w = best.t, best.face, best.u, best.v, best.w
     unresolved = np.int64(0)
@@ -112,7 +112,7 @@ def nearest_in_blocks(tree, first, count, t_min, shear, best):
 
 @kernel
 def nearest_carefully(tree, first, count, ray, shear, best):
-    """``nearest_in_blocks`` with the uncertain hits too, as ``resolve_uncertain`` makes them."""
+    """``nearest_in_blocks`` with uncertain hits resolved by ``resolve_uncertain``."""
     for block in range(first, first + count):
         hits = hit_triangles(tree, block * BLOCK_WORDS, shear, ray.t_min, best.t)
         bits = hits.bits
@@ -137,7 +137,7 @@ def resolved_hit(tree, block, hits, i, ray, shear):
 
 @kernel
 def search_all_blocks(tree, ray, t_max, any_hit):
-    """The best hit over all blocks, and whether an uncertain one must be resolved; with ``any_hit`` it may be any."""
+    """The best hit over all blocks, or with ``any_hit`` any hit; and whether an uncertain one must be resolved."""
     shear, best, unresolved = make_shear(ray), no_hit(t_max), False
     for first in range(0, tree.count, _BLOCKS_AT_ONCE):
         count = minimum(_BLOCKS_AT_ONCE, tree.count - first)

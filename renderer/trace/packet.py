@@ -1,9 +1,8 @@
-"""Coherent rays through the tree together: sixteen rays, one test of a node's octants against all of them.
+"""Sixteen coherent rays traverse the tree together: one test of a node's octants for all of them.
 
-The test asks for the octants that meet the beam around the rays: the range of origins, swept along the dominant axis
-within the range of slopes. It is implied by each ray's own test, so a packet visits every leaf that its rays would
-visit alone, and only rays that meet a leaf's own box are tested against its triangles. Hits are the same to the last
-bit.
+The test finds the octants that a beam around the rays enters: the range of origins, swept along the dominant axis
+within the range of slopes. Each ray's own test implies it, so a packet visits every leaf that its rays would visit
+alone. Only rays that enter a leaf's own box are tested against its triangles. Hits have the same bits.
 """
 
 from typing import Any, NamedTuple
@@ -68,7 +67,7 @@ class Beam(NamedTuple):
         |           far    near         '  .         low_u + least_u t
         +------------------------------------------> w, in the direction of ``sign``
 
-    A box is met where it is within these lines somewhere from its entry to its exit, and so along v.
+    The beam enters a box that lies within these lines somewhere between its entry and its exit, and likewise along v.
 
     Rows of a node, then ranges of float32: near and far origins along w, origins along u and v, slopes along u and v;
     the sign, and the least distance that counts.
@@ -118,7 +117,7 @@ def highest_origin(floats, axis):
 
 @inlined
 def make_beam(rays):
-    """The beam around sixteen rays; its axis is that of the first one."""
+    """The beam around sixteen rays; the first one gives its axis."""
     floats = rays.floats
     w = load(rays.integers, BLOCK_ROW + 2 * WIDTH) >> 2
     u, v = (w + 1) % 3, (w + 2) % 3
@@ -149,7 +148,7 @@ def make_beam(rays):
 
 @inlined
 def enter_beam(nodes, base, beam, limit):
-    """The bits of the octants of the node at word ``base`` that the beam meets, and their distances along its axis."""
+    """The bits of the octants of the node at word ``base`` that the beam enters, and their distances along its axis."""
     sign, lower, upper = splat8(beam.sign), splat8(beam.lower), splat8(limit)
     n = (load8(nodes, base + beam.near_row) - splat8(beam.near_origin)) * sign
     t0 = select(n > lower, n, lower)
@@ -169,7 +168,7 @@ def enter_beam(nodes, base, beam, limit):
 
 @inlined
 def meet_box(nodes, at, floats, half):
-    """The bits of eight rays, from ``half`` on, that meet the octant whose first word is ``at``: ``enter_boxes``."""
+    """The bits of the eight rays from ``half`` on that enter the octant whose first word is ``at``."""
     t0, t1 = load8(floats, LOWER + half), load8(floats, LIMIT + half)
     for axis in range(3):
         low, high = splat8(load(nodes, at + 16 * axis)), splat8(load(nodes, at + 16 * axis + 8))
@@ -185,7 +184,7 @@ def meet_box(nodes, at, floats, half):
 
 @inlined
 def _middle_entry(nodes, base, beam, rays, t0):
-    """The distances at which a ray in the middle enters the octants, by which they are ordered."""
+    """The distances at which a ray in the middle enters the octants; they sort them."""
     floats, middle = rays.floats, WIDTH // 2
     for row in (beam.row_u, beam.row_v):
         axis = row >> 4
@@ -198,10 +197,11 @@ def _middle_entry(nodes, base, beam, rays, t0):
 
 @inlined
 def push_sorted(node, bits, t0, key, stack, top):
-    """Push the octants in ``bits`` of a node, the one with the least key last. An entry is t0 over the octant's number.
+    """Push the octants in ``bits`` of a node, the one with the least key last. An entry has t0 above the octant's
+    number.
 
-    The place of an octant is the number of those behind it, so no branch depends on the keys. A NaN counts as -inf,
-    because comparisons with NaN are false and would leave places of the stack unwritten.
+    An octant's place is the number of octants behind it, so no branch depends on the keys. NaN counts as -inf;
+    comparisons with NaN are false and would leave places unwritten.
     """
     key = select(key > splat8(np.float32(-np.inf)), key, splat8(np.float32(-np.inf)))
     for i in range(8):
@@ -224,7 +224,7 @@ def _push_all(node, bits, t0, stack, top):
 
 @inlined
 def _next_octant(stack, top, limit):
-    """The uppermost octant of the stack that is not beyond the limit, or -1, and the top below it."""
+    """The topmost octant of the stack that is not beyond the limit, or -1, and the top below it."""
     while top > 0:
         top -= 1
         entry = load(stack, top)
@@ -242,7 +242,7 @@ def child_of(tree, octant):
 
 @inlined
 def meet_octant(nodes, rays, at):
-    """The bits of the rays that meet the octant whose first word is ``at``."""
+    """The bits of the rays that enter the octant whose first word is ``at``."""
     return meet_box(nodes, at, rays.floats, 0) | (meet_box(nodes, at, rays.floats, 8) << 8)
 
 
@@ -250,9 +250,9 @@ def meet_octant(nodes, rays, at):
 def trace_packet(tree, rays, stack, any_hit):
     """Search for hits of sixteen prepared rays with one dominant axis and sign; the results stay in ``rays``.
 
-    With ``any_hit`` a ray ends at its first hit, and nothing is sorted. Returns the number of octants left on the
-    stack, 0 unless the packet gave up, and the bits of the rays with hits to resolve. ``stack`` has
-    ``walk.stack_size`` entries.
+    With ``any_hit`` a ray ends at its first hit, and nothing is sorted. Returns the number of octants left on the stack
+    (0 unless the packet gave up) and the bits of the rays with hits to resolve. ``stack`` has ``walk.stack_size``
+    entries.
     """
     beam, floats, nodes = make_beam(rays), rays.floats, tree.nodes
     limit, unresolved, top, node, left = _most(floats, LIMIT), np.int64(0), np.int64(0), np.int64(0), BUDGET
@@ -285,7 +285,7 @@ def trace_packet(tree, rays, stack, any_hit):
 
 @inlined
 def test_leaf(tree, rays, meeting, leaf, any_hit):
-    """Test the rays in ``meeting`` against a leaf; with ``any_hit`` it ends those it hits, and is their CHILD.
+    """Test the rays in ``meeting`` against a leaf. With ``any_hit`` a hit ends the ray, and the leaf becomes its CHILD.
 
     Returns the bits of those with hits to resolve.
     """

@@ -1,8 +1,8 @@
-"""Any hits of many parallel rays that start near each other, as those of the points of a study in one direction.
+"""Any hits of parallel rays from a small region, such as those of a study's points in one direction.
 
-One beam around all of them goes through the tree and lists the leaves that it meets, with their boxes laid out like
-those of nodes. Then sixteen rays at a time go through that list, which lies in the nearest cache, and not through the
-tree. The beam around all holds that around sixteen of them, so the list has every leaf that a ray would visit alone.
+One beam around all rays traverses the tree and lists the leaves that it enters, with boxes laid out like those of
+nodes. Sixteen rays at a time then test that list, which fits the nearest cache, instead of the tree. The beam around
+all contains the beam around any sixteen, so the list has every leaf that a ray would visit alone.
 """
 
 from typing import Any, NamedTuple
@@ -73,7 +73,7 @@ class ParallelScratch(NamedTuple):
 
 
 class ParallelPointers(NamedTuple):
-    """What lies where in a ``ParallelScratch``, as pointers.
+    """Pointers into a ``ParallelScratch``.
 
     nodes, links  the listed leaves, as nodes
     waiting       the nodes that wait
@@ -105,7 +105,7 @@ def parallel_pointers(scratch):
 
 @inlined
 def _prepare_direction(rays, prepared):
-    """Prepare the first ray sixteen times: all but its origin is that of every ray. Returns its beam."""
+    """Prepare the first ray sixteen times; all rays share everything but the origin. Returns the rays' beam."""
     numbers = offset(prepared.integers, NUMBER)
     for r in range(WIDTH):
         store(numbers, r, 0)
@@ -116,8 +116,8 @@ def _prepare_direction(rays, prepared):
 
 @inlined
 def _prepare_origins(rays, prepared, live, first, count, t_max, limit):
-    """Let the prepared rays be sixteen of the ``count`` that are live, from ``first`` on, the last one again where
-    there are fewer. ``t_max`` and ``limit`` are T and LIMIT of a ray that has hit nothing.
+    """Prepare sixteen of the ``count`` live rays, from ``first`` on; if there are fewer, the last one is repeated.
+    ``t_max`` and ``limit`` are T and LIMIT of a ray without a hit.
     """
     floats, doubles, integers = prepared.floats, prepared.doubles, prepared.integers
     w = load(integers, BLOCK_ROW + 2 * WIDTH) >> 2
@@ -192,7 +192,7 @@ def _list_leaf(tree, parallel, place, octant, child):
 
 @inlined
 def _end_list(parallel, listed):
-    """Fill the last node of the list up with boxes that no beam meets."""
+    """Fill the last node of the list with boxes that no beam enters."""
     place = listed
     while place & 7 != 0:
         base = (place >> 3) * NODE_WORDS + (place & 7)
@@ -204,8 +204,8 @@ def _end_list(parallel, listed):
 
 @kernel
 def _list_leaves(tree, beam, limit, parallel, top):
-    """List leaves that a beam meets, until the list is full or no node waits; returns the nodes that wait, the length
-    of the list, and how many nodes were entered.
+    """List leaves that a beam enters, until the list is full or no node waits. Returns the number of nodes that wait,
+    the length of the list, and the number of nodes entered.
     """
     listed, entered = np.int64(0), np.int64(0)
     while top > 0 and listed + 8 <= LISTED:
@@ -232,7 +232,7 @@ def _list_leaves(tree, beam, limit, parallel, top):
 
 @kernel
 def _test_list(tree, prepared, parallel, listed, beam):
-    """Test sixteen prepared rays against the leaves of the list; returns the bits of those with hits to resolve."""
+    """Test sixteen prepared rays against the listed leaves. Returns the bits of those with hits to resolve."""
     beam, floats, unresolved = _beam_of_sixteen(prepared.floats, beam), prepared.floats, np.int64(0)
     limit = load(floats, LIMIT)
     for base in range(0, (listed + 7) // 8 * NODE_WORDS, NODE_WORDS):
@@ -249,8 +249,8 @@ def _test_list(tree, prepared, parallel, listed, beam):
 
 @inlined
 def _keep_live(tree, rays, found, scratch, parallel, some, unresolved, kept):
-    """Note which of the first ``some`` prepared rays are hidden, and put the numbers of the others behind the ``kept``
-    ones; returns how many are kept then.
+    """Note which of the first ``some`` prepared rays are hidden, and append the others to the ``kept`` live ones.
+    Returns the new number of these.
     """
     integers = scratch.prepared.integers
     for r in range(some):
@@ -274,7 +274,7 @@ def _is_hidden(tree, rays, scratch, i):
 
 @kernel
 def _test_rays(tree, rays, found, scratch, parallel, count, listed, beam, t_max, limit):
-    """Test the rays that have hit nothing yet against the list, sixteen at a time; returns how many are left."""
+    """Test the live rays against the list, sixteen at a time. Returns how many remain."""
     prepared, kept = scratch.prepared, np.int64(0)
     for first in range(0, count, WIDTH):
         _prepare_origins(rays, prepared, parallel.live, first, count, t_max, limit)
@@ -285,8 +285,8 @@ def _test_rays(tree, rays, found, scratch, parallel, count, listed, beam, t_max,
 
 @kernel
 def _try_hiders(tree, rays, found, scratch, parallel, count, t_max):
-    """Test each ray against the leaf that hid one like it, and search for what hides those that start on an edge of the
-    surface; returns how many are not hidden.
+    """Test each ray against the leaf that hid a similar one, and search for hits of those that start on an edge of the
+    surface. Returns how many are not hidden.
     """
     shear, kept = shear_of(scratch.prepared, 0), np.int64(0)
     for i in range(count):
@@ -309,7 +309,7 @@ def _try_hiders(tree, rays, found, scratch, parallel, count, t_max):
 
 @inlined
 def _shear_from(rays, i, shear):
-    """The ``Shear`` of ray ``i``, which has the direction of another one."""
+    """The ``Shear`` of ray ``i``, which shares the direction of another ray."""
     o, row = offset(rays.origins, i * rays.origin_step), offset(rays.starts.rows, i * rays.starts.step)
     w = shear.row_z >> 2
     x, y, z = load(o, (w + 1) % 3) * rays.scale, load(o, (w + 2) % 3) * rays.scale, load(o, w) * rays.scale
@@ -324,8 +324,8 @@ def trace_parallel(tree, rays, found, count, scratch, parallel):
     """Whether each of the first ``count`` rays, which all have the direction and the bounds of the first, hits
     anything.
 
-    ``parallel.hiders`` has a leaf for each ray that is asked first, or 0; afterwards the one that hid it, or 0.
-    Returns whether that is answered: it gives up where the rays are too far apart to share their way.
+    ``parallel.hiders`` has a leaf for each ray that is tested first, or 0; afterwards the leaf that hid it, or 0.
+    Returns False if it gave up because the rays are too far apart.
     """
     beam = _prepare_direction(rays, scratch.prepared)
     ray, t_max = ray_at(rays, 0)

@@ -1,10 +1,10 @@
-"""A point as searches read it."""
+"""A point prepared for searches."""
 
 from typing import NamedTuple
 
 
 class Point(NamedTuple):
-    """A point in the tree's units, and where a block has each axis, as ``load_corners`` wants it."""
+    """A point in the tree's units, and the rows of a block for each axis, as ``load_corners`` takes them."""
 
     row_x: int
     row_y: int

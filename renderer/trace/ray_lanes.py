@@ -1,4 +1,4 @@
-"""Sixteen rays prepared for traversal, side by side in memory: packets read whole rows of them, streams single rays."""
+"""Sixteen prepared rays side by side in memory: packets read whole rows, streams single lanes."""
 
 from typing import Any, NamedTuple
 
@@ -63,13 +63,13 @@ def lane_of(group, k):
 
 @inlined
 def lane_index(r):
-    """How many lanes there are before lane ``r``."""
+    """The number of lanes before lane ``r``."""
     return (r // GROUP_STRIDE) * WIDTH + r % WIDTH
 
 
 @inlined
 def prepare_ray(rays, r, ray, t_max):
-    """Write ``ray``, which has met nothing yet, to lane ``r``; or eight rays, vectors, to the lanes from ``r`` on."""
+    """Write ``ray``, without a hit, to lane ``r``; or eight rays, as vectors, to the lanes from ``r`` on."""
     floats, doubles, integers = rays.floats, rays.doubles, rays.integers
     largest = largest_of(ray)
     slabs, shear = make_slabs(ray, largest), make_shear(ray)
@@ -99,7 +99,7 @@ def prepare_ray(rays, r, ray, t_max):
 
 @inlined
 def prepare_eight(rays, prepared, r, numbers):
-    """Write the eight rays whose numbers stand at ``numbers`` to the lanes from ``r`` on."""
+    """Write the eight rays numbered at ``numbers`` to the lanes from ``r`` on."""
     ray, t_max = eight_rays_at(rays, numbers)
     # A ray from an edge goes through no box here.
     t_max = select(ray.slack == EDGE, -1.0, t_max)
@@ -160,7 +160,7 @@ def put_best(rays, r, best):
 def nearest_in_leaf(tree, rays, r, leaf):
     """Test a leaf, a negative child, for a better hit of ray ``r``.
 
-    Returns whether the ray has any hit now, and whether an uncertain one must be resolved.
+    Returns whether the ray has a hit now, and whether an uncertain one must be resolved.
     """
     first, count = blocks_of(leaf)
     t_min = load(rays.doubles, T_MIN + r)

@@ -1,4 +1,4 @@
-"""A batch of rays and their hits as kernels read and write them, and which rays are in range."""
+"""Batches of rays and their hits as kernels read and write them; the range check of rays."""
 
 from typing import Any, NamedTuple
 
@@ -36,8 +36,8 @@ HIT_ROWS = 6
 class RayPointers(NamedTuple):
     """Pointers to rows of origins and directions, and to t_min and t_max.
 
-    Each has a step from one ray to the next, 0 where all share one. ``scale`` is the tree's, a power
-    of two, so t goes in and out of its units exactly. ``starts`` says which rays start on the surface.
+    Each has a step from one ray to the next, 0 where all share one. ``scale`` is the tree's, a power of two, so t is
+    converted exactly. ``starts`` has the rays that start on the surface.
     """
 
     origins: Any
@@ -53,8 +53,8 @@ class RayPointers(NamedTuple):
 
 
 class HitPointers(NamedTuple):
-    """Pointers to the results: t, face, u, v and side as in ``Hits``, the face at which a ray came upon
-    those that coincide with it, or for any hits only ``hit``, a bool.
+    """Pointers to the results: t, face, u, v and side as in ``Hits``, the first of the coinciding faces that the ray
+    reached; for any hits only ``hit``, a bool.
     """
 
     t: Any
@@ -93,8 +93,8 @@ def hit_pointers(out, count):
 def first_bad_ray(rays, begin, end):
     """The row of the first ray of a range that is out of bounds, or -1.
 
-    In bounds, the components of ``scale`` times the origin are at most FARTHEST, and the largest component of the
-    direction is from SHORTEST to LONGEST. NaN is out of bounds.
+    In bounds means: components of ``scale`` times the origin up to FARTHEST, and a largest component of the direction
+    from SHORTEST to LONGEST. NaN is out of bounds.
     """
     i = begin
     # Eight at a time; those among which one is out of bounds, and the last ones, one by one.
@@ -148,7 +148,7 @@ def ray_at(rays, i):
 
 @inlined
 def eight_rays_at(rays, numbers):
-    """``ray_at`` of the eight rays whose numbers stand at ``numbers``, as vectors."""
+    """``ray_at`` of the eight rays numbered at ``numbers``, as vectors."""
     o, d, s, z = rays.origins, rays.directions, rays.origin_step, rays.direction_step
     origin = gather8(o, numbers, s, 0), gather8(o, numbers, s, 1), gather8(o, numbers, s, 2)
     direction = gather8(d, numbers, z, 0), gather8(d, numbers, z, 1), gather8(d, numbers, z, 2)
@@ -159,21 +159,21 @@ def eight_rays_at(rays, numbers):
 
 @inlined
 def _often_one(base, numbers, step, column):
-    """``gather8`` where often all rays share one row."""
+    """``gather8`` for rows that all rays often share."""
     first = gather8(base, numbers, 0, column)
     return gather8(base, numbers, step, column) if step != 0 else first
 
 
 @inlined
 def starts8(starts, numbers):
-    """Slack and face, as of ``Ray``, of the eight rays whose numbers stand at ``numbers``."""
+    """Slack and face, as in ``Ray``, of the eight rays numbered at ``numbers``."""
     rows, step = starts.rows, starts.step
     return _often_one(rows, numbers, step, SLACK), _often_one(rows, numbers, step, FACE)
 
 
 @inlined
 def _scaled(origin, direction, t_min, t_max, scale, slack, leaving):
-    """Rays in the tree's units, whose ``scale`` is given, and their t_max."""
+    """Rays in the tree's units, given its ``scale``, and their t_max."""
     # A t_min above 0 stays above 0 in the tree's units too, so that a hit at the origin is still too near.
     t_min = select(t_min > 0.0, maximum(t_min * scale, _TINIEST), t_min)
     ray = Ray(origin[0] * scale, origin[1] * scale, origin[2] * scale, *direction, t_min, slack, leaving)
@@ -185,7 +185,7 @@ def _scaled(origin, direction, t_min, t_max, scale, slack, leaving):
 def write_hit(found, i, scale, best, dz, any_hit):
     """Write the ``Best`` hit of ray ``i``, or with ``any_hit`` only whether there is one.
 
-    ``dz`` is the ray's ``Shear.direction_z``: with the sign of w it tells the side of the face that the ray came from.
+    ``dz`` is the ray's ``Shear.direction_z``: with the sign of w it gives the side of the face that the ray came from.
     """
     t, face, u, v, w = best.t, best.face, best.u, best.v, best.w
     hit = face != NO_FACE

@@ -1,9 +1,8 @@
-"""Resolves uncertain hits: those whose t or determinant rounding may have made, and those at an edge.
+"""Resolves uncertain hits: those whose t or determinant rounding could decide, and those at an edge.
 
-Three rules hold afterwards. At an edge the exact signs decide whether the ray meets a face. No t lies outside the
-stretch in which the ray is within its face's own box, so the search for it leaves out no box on its way. And a hit
-whose determinant was uncertain is computed anew with twice the digits: it counts where the ray comes within ROUNDING of
-the face.
+Afterwards three rules hold. At an edge, exact signs decide whether the ray hits a face. t is clamped to the ray's
+interval inside the face's box, so a search never skips a box that contains the hit. A hit with an uncertain determinant
+is computed with twice the digits, and counts if the ray comes within ROUNDING of the face.
 """
 
 from typing import Any, NamedTuple
@@ -61,11 +60,11 @@ _SLACK = 2.0**-50
 
 @kernel
 def resolve_uncertain(tree, at, ray, shear, hit, determinant_uncertain):
-    """The ``FaceHit`` that an uncertain one on the face at ``at`` counts as.
+    """The ``FaceHit`` that an uncertain hit on the face at ``at`` becomes.
 
     A ray that begins exactly on the face hits it at t = 0. t is clamped to the ray's interval inside the face's own
     box, in the arithmetic of ``enter_boxes``. That is monotone: the ray enters no box around this one later, and leaves
-    none earlier. The result depends on the ray and the face alone, not on t_min, so every search gets the same.
+    none earlier. The result depends on the ray and the face alone, not on t_min.
     """
     height = _height_sign(tree, at, ray)
     if height == 0:
@@ -100,7 +99,7 @@ def resolve_uncertain(tree, at, ray, shear, hit, determinant_uncertain):
 
 @kernel
 def _height_sign(tree, at, ray):
-    """The exact sign of normal . (p0 - origin) where the origin is near the plane of a face, 0 in it; else _FAR."""
+    """The exact sign of normal . (p0 - origin) for an origin near the plane of a face, 0 in the plane; else _FAR."""
     (p0, p1, p2), o = corners_at(tree, at), _origin(ray)
     one, other, way = sub(p1, p0), sub(p2, p0), sub(p0, o)
     normal = cross(one, other)
@@ -114,7 +113,7 @@ def _height_sign(tree, at, ray):
 
 @kernel
 def _scaled_normal(tree, at):
-    """The normal of a face as pairs, its sides scaled by a power of two."""
+    """The normal of a face as pairs; its sides are scaled by a power of two."""
     p0, p1, p2 = corners_at(tree, at)
     side = maximum(largest_component(sub(p1, p0)), largest_component(sub(p2, p0)))
     unit = 1.0 / power_below(side)
@@ -128,7 +127,7 @@ def _origin(ray):
 
 @inlined
 def _direction(ray):
-    """A ray's direction, scaled by a power of two, and that."""
+    """A ray's direction scaled by a power of two, and that power."""
     d = ray.dx, ray.dy, ray.dz
     unit = power_below(largest_component(d))
     return scale(d, 1.0 / unit), unit
@@ -143,7 +142,7 @@ def _slope(tree, at, ray):
 
 @kernel
 def _exact_t(tree, at, ray):
-    """Where a ray meets the plane of a face, with twice the digits."""
+    """t for the plane of a face, with twice the digits."""
     (p0, _, _), o, (d, d_unit) = corners_at(tree, at), _origin(ray), _direction(ray)
     way = sub(p0, o)
     unit = power_below(maximum(largest_component(way), LEAST_NORMAL))
@@ -154,8 +153,8 @@ def _exact_t(tree, at, ray):
 
 @kernel
 def _met_at_start(tree, at, ray, shear):
-    """Whether a ray that begins in the plane of a face begins on it, and then its hit: at t = 0, unless it runs in the
-    plane.
+    """Whether a ray that starts in the plane of a face starts on the face, and its hit: t = 0, unless the ray lies in
+    the plane.
     """
     (p0, p1, p2), o, slope = corners_at(tree, at), _origin(ray), _slope(tree, at, ray)
     holds = lies_within(p0, p1, p2, o, local_doubles()) == 1
@@ -169,7 +168,7 @@ def _met_at_start(tree, at, ray, shear):
 
 @inlined
 def _own_box(tree, at, ray, largest):
-    """The interval in which a ray is within a face's own box, as ``enter_boxes`` has it."""
+    """The ray's interval inside a face's own box, in the arithmetic of ``enter_boxes``."""
     t0, t1 = np.float32(0.0), np.float32(np.inf)
     t0, t1 = _meet_slab(tree, at, 0, ray.ox, ray.dx, largest, t0, t1)
     t0, t1 = _meet_slab(tree, at, 1, ray.oy, ray.dy, largest, t0, t1)
@@ -217,7 +216,7 @@ class _Face(NamedTuple):
 
 @kernel
 def _meet_face(tree, at, ray, least, most):
-    """t, u and v of a face, with twice the digits; NaN for t where the ray passes it by.
+    """t, u and v of a face, with twice the digits; t is NaN for a miss.
 
     From least to most the ray is within the face's box.
     """
@@ -237,7 +236,7 @@ def _meet_face(tree, at, ray, least, most):
 
 @kernel
 def _meet_side(a, b, c, o, d, least, most):
-    """t, from least to most, and the weights of b and c of a face whose longest side is from a to b."""
+    """t, clamped to least and most, and the weights of b and c of a face whose longest side is from a to b."""
     reach = largest_of_three(sub(a, o), sub(b, o), sub(c, o))
     far, d_unit, side = power_below(reach), power_below(largest_component(d)), power_below(largest_component(sub(b, a)))
     face = _Face(
@@ -260,7 +259,7 @@ def _meet_side(a, b, c, o, d, least, most):
 
 @kernel
 def _meet_plane(face, normal, low, high):
-    """t and weights of a face that is no line: where the ray meets its plane, as near as the face's outline allows."""
+    """t and weights of a face that is no line: where the ray meets its plane, clamped to the face's outline."""
     d, n = face.direction, heads(normal)
     numerator, determinant = dot_pairs(normal, face.first), dot_pairs(normal, as_pairs(d))
     low, high = _within_outline(face, normalized(n), low, high)
@@ -277,7 +276,7 @@ def _meet_plane(face, normal, low, high):
 
 @kernel
 def _within_outline(face, normal, low, high):
-    """The part of low to high in which a ray is over the outline of a face, as widened by ROUNDING."""
+    """The part of [low, high] in which a ray is over the outline of a face, widened by ROUNDING."""
     d, first, second = face.direction, heads(face.first), heads(face.second)
     along, back, other = normalized(heads(face.along)), normalized(face.back), normalized(heads(face.other))
     low, high = _beyond(cross(normal, along), first, d, low, high)
@@ -290,7 +289,7 @@ def _within_outline(face, normal, low, high):
 
 @inlined
 def _beyond(inward, corner, d, low, high):
-    """Narrow low to high to where a ray is beyond a line through a corner, or ROUNDING before it."""
+    """[low, high] narrowed to where a ray is beyond a line through a corner, or ROUNDING before it."""
     least, rate = dot(inward, corner) - ROUNDING, dot(inward, d)
     if rate > 0.0:
         return maximum(low, least / rate), high
@@ -301,7 +300,7 @@ def _beyond(inward, corner, d, low, high):
 
 @kernel
 def _weights(face, normal, t):
-    """The weights of the second corner and the apex at t: of the point x where the ray is then.
+    """The weights of the second corner and the apex for x, the point of the ray at t.
 
                       apex
                      . |  .
@@ -310,8 +309,8 @@ def _weights(face, normal, t):
             first--------------second
                  along foot             both as shares of the longest side
 
-    The apex's weight is the height of x as a share of the apex's. It errs most, of thin faces, so it keeps to what the
-    face has above ``along``.
+    The apex's weight is the height of x over that of the apex. For thin faces it errs most, so it is clamped to the
+    face's range above ``along``.
     """
     side, other = heads(face.along), heads(face.other)
     point = scale(sub(scale(face.direction, t), heads(face.first)), face.ratio)
@@ -353,7 +352,7 @@ def _meet_line(face, low, high):
 
 @inlined
 def _second(face, t):
-    """The weight of the second corner at the place of the longest side that is nearest to the ray at t."""
+    """The weight of the second corner at the point of the longest side nearest to the ray at t."""
     along = heads(face.along)
     way = dot(sub(scale(face.direction, t), heads(face.first)), along) / dot(along, along) * face.ratio
     return _clamped(way, 0.0, 1.0)
@@ -361,5 +360,5 @@ def _second(face, t):
 
 @inlined
 def _place(face, t):
-    """The place of the longest side that is nearest to the ray at t, relative to the origin."""
+    """The point of the longest side nearest to the ray at t, relative to the origin."""
     return add(heads(face.first), scale(heads(face.along), _second(face, t) / face.ratio))

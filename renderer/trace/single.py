@@ -21,8 +21,8 @@ FEW_DEPTH = (LOCAL_WORDS - stack_size(0)) // 7
 def search_singly(tree, ray, t_max, stack):
     """The closest hit of one ray, with every uncertain hit resolved, as ``Found``.
 
-    The octants of a node are visited from the last to the first, not by their distance. That suits few rays and
-    compiles in a fraction of the time that packets and streams take.
+    The octants of a node are visited from the last to the first, not by distance. That suits few rays and compiles much
+    faster than packets and streams.
     """
     # rule: first-limit
     best = no_hit(t_max)
@@ -38,7 +38,9 @@ def _visit(tree, single, first, count, found):
 
 @kernel
 def search_carefully(tree, rays, i, stack, holders, any_hit):
-    """``search_singly`` for ray ``i``; where it starts on the surface ``search_from``, which ends early for any hit."""
+    """``search_singly`` for ray ``i``, or ``search_from`` if it starts on the surface; the latter ends early for any
+    hit.
+    """
     ray, t_max = ray_at(rays, i)
     if ray.leaving >= 0.0:
         return search_from(tree, rays.starts, i, ray, t_max, stack, holders, any_hit)
@@ -49,8 +51,8 @@ def search_carefully(tree, rays, i, stack, holders, any_hit):
 def write_best(tree, rays, found, i, best, slack, largest, dz, any_hit):
     """Write the best hit of ray ``i``, see ``write_hit``; t counts from its exact start.
 
-    ``slack`` is the ray's, ``largest`` the largest component of its direction: where the hit is near, the way that its
-    origin was moved is a part of t.
+    ``slack`` is the ray's, ``largest`` the largest component of its direction: for a near hit, the move of the origin
+    is a part of t.
     """
     if not any_hit and is_near_start(slack, best.t * largest):
         best = count_from_start(tree, rays, i, best)

@@ -1,4 +1,4 @@
-"""One ray as it walks alone through a tree."""
+"""One ray that traverses a tree alone."""
 
 from typing import Any, NamedTuple
 
@@ -19,9 +19,9 @@ from renderer.trace.intersect import (
 
 
 class SingleRay(NamedTuple):
-    """A ray, prepared for the tests of triangles and of boxes.
+    """A ray prepared for triangle and box tests.
 
-    lower    the distance at which t_min lies, eight times
+    lower    the distance of t_min, eight times
     largest  the largest component of the direction
     """
 
@@ -33,7 +33,7 @@ class SingleRay(NamedTuple):
 
 
 class Found(NamedTuple):
-    """The best hit so far, and the number of nodes and blocks that it took."""
+    """The best hit so far, and the number of nodes and blocks visited."""
 
     best: Best
     steps: int
@@ -48,12 +48,12 @@ def prepare_single(ray):
 
 @inlined
 def enter_node(tree, node, single, t_max):
-    """The entry distances of a node's octants, and the bits of those that a ray meets up to ``t_max``."""
+    """The entry distances of a node's octants, and the bits of those that a ray enters up to ``t_max``."""
     return enter_boxes(tree.nodes, node, single.slabs, single.lower, splat8(box_limit(t_max, single.largest)))
 
 
 @inlined
 def enter_counted(tree, single, node, found):
-    """``enter_node`` up to the best hit ``Found`` so far, as a ``walk`` enters a node; the node counts as a step."""
+    """``enter_node`` up to the best hit so far, for ``walk``; the node counts as a step."""
     _, bits = enter_node(tree, node, single, found.best.t)
     return Found(found.best, found.steps + 1), bits

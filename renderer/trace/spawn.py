@@ -1,4 +1,4 @@
-"""The start of a ray that leaves a surface: off it by more than rounding errors, without a chosen epsilon.
+"""The start of a ray that leaves a surface: off it by the bound of rounding errors, without a chosen epsilon.
 
 Vectors are tuples of float64.
 """
@@ -83,7 +83,7 @@ MITSUBA_EPSILON = 1500.0 * 2.0**-24
 
 
 class OffsetRule(NamedTuple):
-    """The distance from its surface at which a ray starts: the bound of roundings, or (1 + max|p|) ``epsilon``."""
+    """The distance from the surface at which a ray starts: the bound of roundings, or (1 + max|p|) ``epsilon``."""
 
     uses_error_bound: bool
     epsilon: float
@@ -93,8 +93,8 @@ BOUNDED = OffsetRule(True, 0.0)
 
 
 class Place(NamedTuple):
-    """Where a ray met the surface: the face, as float64, its barycentrics, the slack of rays from there, and the side
-    of n_g that the ray came from, 1 or -1.
+    """A hit at which a ray may start: the face, as float64, its barycentrics, the slack of rays from there, and the
+    side of n_g that the ray came from, 1 or -1.
     """
 
     face: float
@@ -105,7 +105,7 @@ class Place(NamedTuple):
 
 
 class Facet(NamedTuple):
-    """A face for the rays that start on it: the unit normal, twice the area, and the largest component of a side."""
+    """A face for rays that start on it: unit normal, twice the area, and the largest component of a side."""
 
     normal: Any
     double_area: float
@@ -114,20 +114,20 @@ class Facet(NamedTuple):
 
 @inlined
 def _extends(n, side):
-    """Whether the corners of a face do not lie on a line, as rounded; n is the product of two of its sides."""
+    """Whether a face's corners, as rounded, do not lie on a line; n is the product of two of its sides."""
     return largest_component(n) > side * LINE * side
 
 
 @inlined
 def has_normal(p0, p1, p2):
-    """Whether a face has a normal of its own, the same for all rays."""
+    """Whether a face has a normal of its own, which does not depend on the ray."""
     one, other = sub(p1, p0), sub(p2, p0)
     return _extends(cross(one, other), largest_of_three(one, other, sub(p2, p1)))
 
 
 @inlined
 def facet_of(p0, p1, p2, d):
-    """The ``Facet`` of a face that a ray of direction d meets, with its normal by its winding."""
+    """The ``Facet`` of a face hit by a ray of direction d, with its normal by winding."""
     one, other = sub(p1, p0), sub(p2, p0)
     n, side = cross(one, other), largest_of_three(one, other, sub(p2, p1))
     unit, double_area = unit_and_length(n)
@@ -136,8 +136,8 @@ def facet_of(p0, p1, p2, d):
 
 @kernel
 def _normal_of_line(p0, p1, p2, d):
-    """The normal of a face that has none: it fills a slit between its neighbours, so it is taken for one that looks
-    back along d as far as its longest side allows.
+    """The normal for a face without one: it fills a slit between its neighbours, so it faces back along d as far as its
+    longest side allows.
     """
     side0, side1, side2 = sub(p2, p1), sub(p0, p2), sub(p1, p0)
     l0, l1, l2 = largest_component(side0), largest_component(side1), largest_component(side2)
@@ -152,7 +152,7 @@ def _normal_of_line(p0, p1, p2, d):
 
 @inlined
 def _clearance(side, double_area, reach):
-    """The distance from a face's plane beyond which no ray that leads away meets the face.
+    """The distance from a face's plane beyond which no ray that leads away hits the face.
 
     ``side`` is the largest component of its sides, ``reach`` that of a corner relative to the ray's start.
     """
@@ -164,8 +164,8 @@ def _clearance(side, double_area, reach):
 
 @inlined
 def offset_distance(p, p0, p1, p2, u, v, facet):
-    """The distance by which p = (1 - u - v) p0 + u p1 + v p2 must move along the normal to be off the face's plane for
-    certain; and the slack of a ray that starts there, EDGE near an edge. ``facet`` is the ``Facet`` of the face.
+    """The distance by which p = (1 - u - v) p0 + u p1 + v p2 must move along the normal to be certainly off the face's
+    plane, and the slack of a ray that starts there, EDGE near an edge. ``facet`` is the ``Facet`` of the face.
 
     The bound of p's own rounding (PBRT 4, 6.8.6), and that of the next ray's test against the same triangle, which
     matters where the first vanishes (on a plane through the origin) and for slivers.
@@ -185,7 +185,7 @@ def offset_distance(p, p0, p1, p2, u, v, facet):
 
 @inlined
 def _from_edges(p, side):
-    """How far from the edges of its face a start must be, for whatever it may be moved by."""
+    """The least distance of a moved start from the edges of its face."""
     return _INSIDE * slack_of(p, _FARTHEST_MOVE * side)
 
 
@@ -204,10 +204,10 @@ def _away(x, step, towards):
 
 @inlined
 def spawn_origin(p, error, n_g, w, rule):
-    """The start of a ray from the surface point p in direction w that does not meet that surface again.
+    """The start of a ray from the surface point p in direction w that does not hit that surface again.
 
-    By the ``OffsetRule``: moved along n_g by ``error``, the bound of ``offset_distance``, and rounded away; or as
-    Mitsuba does, by its epsilon.
+    By the ``OffsetRule``: moved along n_g by ``error``, the bound of ``offset_distance``, and rounded away; or by
+    Mitsuba's epsilon.
     """
     side = 1.0 if dot(n_g, w) >= 0.0 else -1.0
     if not rule.uses_error_bound:
@@ -220,9 +220,8 @@ def spawn_origin(p, error, n_g, w, rule):
 
 @inlined
 def put_start(row, place, n_g, w, d, rule):
-    """Write the row of ``starts.record`` for a ray in direction w from a ``Place``, where one of direction d came. It
-    is on the side of the face that it leads to: where that is not the one that the ray before it came from, it has gone
-    through the face.
+    """Write the row of ``starts.record`` for a ray in direction w from a ``Place`` that a ray of direction d reached.
+    Its side is the one that w leads to; if that is not the side that d came from, the ray has gone through the face.
     """
     slope = dot(n_g, w)
     side = 1.0 if slope >= 0.0 else -1.0
@@ -241,7 +240,7 @@ def put_start(row, place, n_g, w, d, rule):
 
 @kernel
 def start_row(row, place, n_g, w, d):
-    """For Python: ``put_start`` to an array (starts.record.ROW,), by the bounded offset."""
+    """``put_start`` for Python: an array (starts.record.ROW,), by the bounded offset."""
     put_start(pointer(row), place, n_g, w, d, BOUNDED)
 
 
@@ -253,8 +252,8 @@ def put_no_start(row):
 
 
 class _Plane(NamedTuple):
-    """The plane of a face near a point: the unit normal, the point's height above it, how far a start must be from it,
-    the slack of that start, and whether the point is so far inside the face that no more is to be known.
+    """The plane of a face near a point: the unit normal, the point's height above it, the distance that a start needs,
+    the slack of that start, and whether the point is certainly inside the face.
     """
 
     normal: Any
@@ -266,7 +265,7 @@ class _Plane(NamedTuple):
 
 @inlined
 def _plane_near(p0, p1, p2, o):
-    """The ``_Plane`` of a face near o. Of a face without area nothing is known, and no point is inside it."""
+    """The ``_Plane`` of a face near o. For a face without area nothing is known, and no point is inside it."""
     one, other, q = sub(p1, p0), sub(p2, p0), sub(o, p0)
     n = cross(one, other)
     whole = dot(n, n)
@@ -288,7 +287,7 @@ def _plane_near(p0, p1, p2, o):
 
 @inlined
 def _moved(o, plane, away):
-    """The point o near a face, moved along its normal to where it is off for certain; away = -1 is the other side."""
+    """The point o near a face, moved along the normal until it is certainly off; away = -1 is the other side."""
     out = scale(plane.normal, away)
     # rule: move-off-face
     step = scale(out, plane.needed - away * plane.height)
@@ -297,8 +296,8 @@ def _moved(o, plane, away):
 
 @inlined
 def _side_of(slope, w, code):
-    """The side of its face that a ray of direction w leaves to, 0 where rounding may have made it or where the code
-    says that it starts on the other one; ``slope`` is the unit normal times w.
+    """The side of its face to which a ray of direction w leaves; 0 if rounding could decide it, or if the code says
+    that the ray starts on the other side. ``slope`` is the unit normal times w.
     """
     side = 1.0 if slope >= 0.0 else -1.0
     if abs(slope) <= LEVEL * largest_component(w):
@@ -309,10 +308,10 @@ def _side_of(slope, w, code):
 
 @inlined
 def offset_from_face(corners, o, w, unit, code):
-    """Where a ray from the point o near a face starts in direction w: off the face, see ``offset_from_faces``; and its
-    slack, EDGE where the start is near an edge or the face stops the ray. Then it starts at o.
+    """The start of a ray from o, near a face, in direction w: off the face, see ``offset_from_faces``; and its slack.
+    Near an edge, or if the face stops the ray, the start is o and the slack EDGE.
 
-    ``corners`` are ``corners_of`` the face; o comes and goes in the mesh's own units, the slack is in those of corners.
+    ``corners`` are ``corners_of`` the face; o and the start are in the mesh's units, the slack in those of ``corners``.
     """
     scaled = scale(o, unit)
     plane = _plane_near(corners[0], corners[1], corners[2], scaled)
@@ -336,13 +335,13 @@ def offset_to_both_sides(corners, o, unit):
 
 @inlined
 def _lies_above(start, o):
-    """Whether a start was moved by more than points that went through float32 are off, half of that at the least."""
+    """Whether a start was moved by more than half of what points that went through float32 may be off."""
     return largest_component(sub(start, o)) > 0.25 * FARTHEST_START * largest_component(o)
 
 
 @kernel
 def _lies_far(corners, o, unit):
-    """Whether a point is farther from a face than points that went through float32 are."""
+    """Whether a point is farther from a face than points that went through float32 may be."""
     p0, p1, p2 = corners
     o = scale(o, unit)
     most = maximum(largest_component(o), largest_of_three(p0, p1, p2))
@@ -351,7 +350,7 @@ def _lies_far(corners, o, unit):
 
 @inlined
 def _lies_at(corners, weights, o, unit):
-    """Whether a point is where the barycentrics of a face say, as near as ``_lies_far`` wants it."""
+    """Whether a point is where a face's barycentrics say, as exactly as ``_lies_far`` demands."""
     p0, p1, p2 = corners
     most = largest_of_three(p0, p1, p2)
     place = barycentric(p0, p1, p2, weights[0], weights[1])
@@ -360,7 +359,7 @@ def _lies_at(corners, weights, o, unit):
 
 @kernel
 def _at_corner(start, o, unit):
-    """The corner that a start is on, from which a ray starts exactly, and its slack; elsewhere o and EDGE."""
+    """The corner on which a start lies, from which a ray starts exactly, and its slack; elsewhere o and EDGE."""
     anchor = anchor_of(start)
     if anchor.zeros & (anchor.zeros - 1) == 0:
         return o, EDGE
@@ -376,8 +375,8 @@ def offset_from_faces(vertices, faces, origins, directions, leaving, starts, row
     rows        (n, starts.record.ROW) float64, which is written too
     unit        the tree's scale, in whose units no product overflows or vanishes
 
-    A start moves along its face's normal only, by no more than its distance from the plane and some roundings, so that
-    the ray meets neither that face nor another in its plane. Returns the row of the first origin that is too far from
+    A start moves only along its face's normal, by no more than its distance from the plane and some roundings, so that
+    the ray hits neither that face nor another in its plane. Returns the row of the first origin that is too far from
     its face, or -1.
     """
     corners, code_step = pointer(vertices), np.int64(len(leaving.code) > 1)

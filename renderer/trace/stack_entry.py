@@ -1,4 +1,4 @@
-"""An entry of a stack of octants, int64: the distance at which a ray enters one above 32 bits that say which it is."""
+"""Entries of a stack of octants, int64: the entry distance of a ray above the 32 bits of the octant."""
 
 import numpy as np
 
@@ -28,7 +28,7 @@ def octant_of(entry):
 
 @inlined
 def child_of_entry(entry):
-    """The child, where the entry has one in place of a number: int32, and so perhaps negative."""
+    """The child of an entry that has one in place of an octant number: int32, perhaps negative."""
     return np.int64(np.int32(entry & _LOW_WORD))
 
 

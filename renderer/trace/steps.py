@@ -1,4 +1,4 @@
-"""The steps of the search for a ray's closest hit, counted: what heat maps of a tree's quality are made of."""
+"""Counts the steps of a ray's search for its closest hit, for heat maps of a tree's quality."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -25,7 +25,7 @@ _WORK = 1 << 18
 
 
 def count_steps(tree: Tree, rays: RayBatch, shape: tuple[int, ...], threads: int) -> Steps:
-    """Steps of a batch of rays of some dimensions, see ``Octree.count_steps``."""
+    """Steps of a batch of rays, see ``Octree.count_steps``."""
     counts, bad = np.zeros((2, rays.number), np.int64), list[int]()
 
     def count(begin: int, end: int) -> Iterator[None]:
@@ -53,7 +53,7 @@ def _count_chunk(descriptor, rays, counts, stack, near, begin, end):
     stack  memory for ``walk.stack_size`` int64
     near   for as many float32 and eight more
 
-    Returns the ray before which it ended, early after _WORK; and the row of a ray out of range, or -1.
+    Returns the ray before which it ended, early after _WORK, and the row of a ray out of range, or -1.
     """
     tree, source = tree_pointers(descriptor), ray_pointers(rays, tree_pointers(descriptor).scale)
     bad, work = first_bad_ray(source, begin, end), np.int64(0)
@@ -69,7 +69,7 @@ def _count_chunk(descriptor, rays, counts, stack, near, begin, end):
 
 
 class _Waiting(NamedTuple):
-    """Pointers to the children that wait, to the distances of their boxes, and to those of eight octants."""
+    """Pointers to the waiting children, to the distances of their boxes, and to those of eight octants."""
 
     stack: Any
     near: Any
@@ -77,14 +77,14 @@ class _Waiting(NamedTuple):
 
 
 class _Query(NamedTuple):
-    """A ray, and what waits for it."""
+    """A ray, and its waiting children."""
 
     single: SingleRay
     waiting: _Waiting
 
 
 class TraversalCounts(NamedTuple):
-    """The best hit so far, and the nodes and triangles that it took."""
+    """The best hit so far, and the numbers of nodes and triangles tested."""
 
     best: Best
     nodes: int
@@ -149,5 +149,5 @@ def _push_sorted(tree, node, bits, waiting, top):
 
 @inlined
 def _precedes(distance, child, other_distance, other):
-    """Whether a box is nearer than another; of equal ones nodes come before leaves."""
+    """Whether a box is nearer than another; at equal distance nodes come before leaves."""
     return distance < other_distance or (distance == other_distance and order_of(child) < order_of(other))

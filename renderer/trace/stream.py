@@ -1,8 +1,9 @@
-"""Incoherent rays through the tree, up to forty at a time: eight more begin where there is room.
+"""Incoherent rays traverse the tree, up to forty at a time; eight more begin where there is room.
 
 The processor cannot predict whether a ray goes to a node, goes to a leaf, or ends, and a mispredicted branch discards
-all work begun after it. So each round first computes what every ray meets, without a branch, and then decides: the
-results are there by then, and a misprediction costs little. Meanwhile the records for the next round come from memory.
+all work begun after it. So each round first computes the boxes or triangles that every ray hits, without a branch, and
+then decides. By then the results are there, so a misprediction costs little. Meanwhile memory loads the records of the
+next round.
 """
 
 from typing import Any, NamedTuple
@@ -57,12 +58,12 @@ _LINE = CACHE_LINE // 4
 
 @inlined
 def _prefetch_child(tree, child):
-    """Ask for the record that a ray's next step will read."""
+    """Prefetch the record of a ray's next step."""
     if child >= 0:
         for line in range(NODE_WORDS // _LINE):
             prefetch(tree.nodes, child * NODE_WORDS + line * _LINE)
     else:
-        # A float64 block is twice as long: every second line is asked for, the hardware fetches the next one by itself.
+        # A float64 block is twice as long: prefetch every second line; the hardware fetches the next.
         first = first_block(child) * BLOCK_WORDS
         for line in range(3):
             prefetch(tree.blocks, (first + line * _LINE) << tree.wide)
@@ -99,8 +100,8 @@ class LaneCounts(NamedTuple):
 
 
 class Queue(NamedTuple):
-    """Rays that wait for lanes: their numbers, with seven more that may be read; the first that has not begun; and how
-    many they are.
+    """Rays that wait for lanes: their numbers, with seven more that may be read; the first that has not begun; their
+    count.
     """
 
     numbers: Any
@@ -129,13 +130,13 @@ def make_lanes(integers, doubles, stack_size):
 
 @inlined
 def clear_lanes(lanes):
-    """Let all lanes be free."""
+    """Free all lanes."""
     store(lanes.left, HALF_GROUPS, (1 << HALF_GROUPS) - 1)
 
 
 @inlined
 def begin_rays(rays, prepared, lanes, queue, counts):
-    """Let rays of a queue begin, eight at a time, while few are under way and lanes are free.
+    """Begin rays of a queue, eight at a time, while few are under way and lanes are free.
 
     Returns the first ray that still waits, and the ``LaneCounts``.
     """
@@ -156,7 +157,7 @@ def begin_rays(rays, prepared, lanes, queue, counts):
 
 @inlined
 def begin_ray(prepared, lanes, r, number):
-    """Let the prepared ray in lane ``r`` start at the root."""
+    """Start the prepared ray in lane ``r`` at the root."""
     integers, bottom = prepared.integers, stack_of(lanes, r)
     store(integers, CHILD + r, 0)
     store(integers, TOP + r, bottom + 1)
@@ -167,13 +168,13 @@ def begin_ray(prepared, lanes, r, number):
 
 @inlined
 def stack_of(lanes, r):
-    """Where the stack of lane ``r`` begins in ``stacks``."""
+    """The offset of the stack of lane ``r`` in ``stacks``."""
     return lane_index(r) * lanes.stack_size
 
 
 @inlined
 def end_ray(lanes, r):
-    """Count a ray as ended; its eight lanes are free when it is the last of them."""
+    """Count a ray as ended; the last of eight frees their lanes."""
     half = lane_index(r) // 8
     left = load(lanes.left, half) - 1
     store(lanes.left, half, left)
@@ -190,9 +191,9 @@ def wait_octant(prepared, lanes, r, entry, child):
 
 @inlined
 def meet_nodes(tree, rays, lanes, count):
-    """Push the octants of its node that each of ``count`` rays meets onto its stack, the nearest last.
+    """For each of ``count`` rays, push the octants of its node that it enters, the nearest last.
 
-    It takes no branch: all eight are sorted and written, and the top moves by those that are met.
+    No branch: all eight are sorted and written, and the top moves by the number entered.
     """
     for k in range(count):
         r = load(lanes.at_node, k)
@@ -205,7 +206,7 @@ def meet_nodes(tree, rays, lanes, count):
 
 @inlined
 def resume(tree, rays, lanes, r):
-    """Take the next child of ray ``r`` that is not beyond its best hit off its stack, and return it."""
+    """Pop the next child of ray ``r`` that is not beyond its best hit, and return it."""
     # rule: resume-limit
     limit, top = load(rays.floats, LIMIT + r), load(rays.integers, TOP + r) - 1
     entry = load(lanes.stacks, top)
@@ -221,7 +222,7 @@ def resume(tree, rays, lanes, r):
 
 @inlined
 def meet_leaves(tree, rays, lanes, count):
-    """Compute what each of ``count`` rays hits in the first block of its leaf."""
+    """Compute the hits of each of ``count`` rays in the first block of its leaf."""
     for k in range(count):
         r = load(lanes.at_leaf, k)
         base, shear = first_block(load(rays.integers, CHILD + r)) * BLOCK_WORDS, shear_of(rays, r)
@@ -240,7 +241,7 @@ def meet_leaves(tree, rays, lanes, count):
 
 @inlined
 def take_hits(tree, rays, lanes, k):
-    """Keep the best hit of the first block that the ``k``-th ray at a leaf met, and whether one must be resolved.
+    """Keep the best hit of the ``k``-th ray at a leaf in its first block, and whether one must be resolved.
 
     Returns whether there is a hit.
     """
@@ -265,7 +266,7 @@ def take_hits(tree, rays, lanes, k):
 
 @inlined
 def leave_leaf(tree, rays, lanes, r):
-    """Choose the next child of ray ``r`` at a leaf: the rest of its blocks, else one off its stack. Returns it."""
+    """Choose the next child of ray ``r`` at a leaf: the rest of its blocks, else one from its stack. Returns it."""
     child = load(rays.integers, CHILD + r)
     # rule: rest-of-leaf
     if ~child & (MAX_LEAF_BLOCKS - 1) != 0:
@@ -278,9 +279,9 @@ def leave_leaf(tree, rays, lanes, r):
 
 @inlined
 def list_lane(lanes, r, child, counts):
-    """Put lane ``r`` into the list of nodes, of leaves or of ends, as its next child is; returns the ``LaneCounts``.
+    """Append lane ``r`` to the list of nodes, leaves or ends, by its next child. Returns the ``LaneCounts``.
 
-    It takes no branch: the lane is written to all three.
+    No branch: the lane is written to all three.
     """
     nodes, leaves, ends = counts.nodes, counts.leaves, counts.ends
     store(lanes.at_node, nodes, r)
@@ -292,12 +293,13 @@ def list_lane(lanes, r, child, counts):
 
 @inlined
 def run_lanes(tree, rays, prepared, lanes, counts, queue, most_rounds, query, meet, take, finish):
-    """Take the rays in lanes to their ends, and those of a queue, of which none begins after ``most_rounds`` rounds.
+    """Trace the rays in lanes and those of a queue to their ends; none of the queue begins after ``most_rounds``
+    rounds.
 
     query   what the three kernels read
-    meet    meet(tree, query, lanes, count): compute what each ray at a leaf meets in the first block of its leaf
-    take    take(tree, query, k): take what the k-th of them met; returns whether the ray ends
-    finish  finish(tree, query, r): what is left to do at the end of the ray in lane r; returns the rounds that it took
+    meet    meet(tree, query, lanes, count): compute the hits of each ray at a leaf in the first block of its leaf
+    take    take(tree, query, k): take the hits of the k-th of them; returns whether the ray ends
+    finish  finish(tree, query, r): finish the ray in lane r; returns the rounds that it took
 
     Returns the first ray that still waits, and the number of rounds.
     """

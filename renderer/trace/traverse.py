@@ -1,4 +1,4 @@
-"""Closest and any hits of a range of rays: coherent sixteens as packets, others as a stream."""
+"""Closest and any hits of a range of rays: sixteen coherent rays as a packet, others as a stream."""
 
 from typing import Any, NamedTuple
 
@@ -69,8 +69,8 @@ class Scratch(NamedTuple):
 
 
 class ScratchPointers(NamedTuple):
-    """What lies where in a ``Scratch``, as pointers: prepared rays, of which a packet takes the first sixteen; a
-    stream's lanes; a packet's stack; the numbers of the rays that wait for a stream; and the faces that hold a start.
+    """Pointers into a ``Scratch``: prepared rays, of which a packet takes the first sixteen; a stream's lanes; a
+    packet's stack; the numbers of the rays that wait for a stream; and the faces that contain a start.
     """
 
     prepared: Prepared
@@ -106,8 +106,8 @@ def scratch_pointers(scratch):
 
 
 class Progress(NamedTuple):
-    """How far rays are traced: the first that no packet was asked for; and of those in ``ScratchPointers.waiting`` the
-    first that no stream took, and their number.
+    """The first ray that was not yet tried as a packet; the first ray in ``ScratchPointers.waiting`` that no stream
+    took; and the number of rays there.
     """
 
     begin: int
@@ -136,7 +136,7 @@ def are_coherent(rays, begin):
 
 
 class _Query(NamedTuple):
-    """Rays under way, where their hits go, the scratch that they share, and whether any hit will do."""
+    """Rays under way, the pointers to their hits, the scratch that they share, and whether any hit will do."""
 
     rays: RayPointers
     found: HitPointers
@@ -146,9 +146,9 @@ class _Query(NamedTuple):
 
 @inlined
 def _finish(tree, query, r):
-    """Write the hit of the ray in lane ``r``, after a careful search on its stack where a hit must be resolved.
+    """Write the hit of the ray in lane ``r``. If a hit must be resolved, a careful search on its stack comes first.
 
-    Returns the rounds of lanes that take as long as that search.
+    Returns the number of rounds that take as long as that search.
     """
     rays, scratch, prepared = query.rays, query.scratch, query.scratch.prepared
     best, steps = best_of(prepared, r), np.int64(0)
@@ -176,7 +176,7 @@ def _take(tree, query, k):
 
 @kernel
 def _run(tree, query, counts, queue):
-    """Take rays in lanes, and those of a queue, to their ends; but none of these begins after _WORK rounds.
+    """Trace rays in lanes and those of a queue to their ends; none of the queue begins after _WORK rounds.
 
     Returns the first ray that still waits, and the number of rounds.
     """
@@ -203,7 +203,7 @@ def _trace_stream(tree, query, following, count):
 
 @kernel
 def _hand_over(tree, query, top, unresolved):
-    """Let the rays of a packet that gave up go on as lanes, each with those of the waiting octants that it meets.
+    """Move the rays of a packet that gave up to lanes, each with the waiting octants that it enters.
 
     Returns the number of rounds.
     """
@@ -230,7 +230,7 @@ def _hand_over(tree, query, top, unresolved):
 
 @inlined
 def _trace_sixteen(tree, query, first):
-    """Trace the rays from ``first`` on as a packet, and as lanes from where it gave up; returns the rounds of lanes."""
+    """Trace the rays from ``first`` on as a packet, and as lanes once it gives up. Returns the rounds of lanes."""
     prepared, rounds = query.scratch.prepared, np.int64(0)
     numbers = offset(prepared.integers, NUMBER)
     for r in range(WIDTH):
@@ -266,9 +266,9 @@ def trace(tree, rays, found, begin, end, scratch, any_hit):
     """Closest hits, or with ``any_hit`` whether there is one, of the rays from ``begin`` to ``end``.
 
     The interval [t_min, t_max] is closed; t counts in units of |direction|; no face is culled. Among equal t the lowest
-    face wins: a node is left behind only when its entry is beyond the best t, never at it, so the answer depends
-    neither on the order of the visits nor on the rays that travel together. Watertight and deterministic (Woop et al.
-    2013); see ``intersect`` for the bounds.
+    face wins: a node is skipped only if its entry is beyond the best t, never at it. So the answer depends neither on
+    the order of visits nor on the rays that travel together. Watertight and deterministic (Woop et al. 2013); see
+    ``intersect`` for the bounds.
     """
     query, progress = _Query(rays, found, scratch, any_hit), Progress(begin, np.int64(0), np.int64(0))
     while progress.begin < end or progress.following < progress.count:
@@ -277,7 +277,7 @@ def trace(tree, rays, found, begin, end, scratch, any_hit):
 
 @kernel
 def _trace_on(tree, query, progress, end):
-    """``trace`` of some rays more; returns the ``Progress`` after them."""
+    """``trace`` for more rays; returns the ``Progress`` after them."""
     rounds, following, count, waiting = np.int64(0), progress.following, progress.count, query.scratch.waiting
     for first in range(progress.begin, end, WIDTH):
         if first + WIDTH <= end and are_coherent(query.rays, first):
@@ -307,8 +307,9 @@ def trace_chunk(descriptor, rays, out, progress, end, any_hit, scratch):
     """Hits of rays up to ``end`` into ``out``: the rows of ``hit_pointers``, or with ``any_hit`` bools.
 
     ``descriptor`` is the tree's, which must have nodes. ``progress`` is (begin, 0, 0) in the first call for a chunk,
-    and later what the last one returned first, with the same scratch: it ends early where much was to do, and all is
-    done at (end, n, n). Also returns the row of the first ray out of range, for which nothing is traced, or -1.
+    then the first value returned by the last call, with the same scratch. A call with much work ends early; all is done
+    at (end, n, n). The second value returned is the row of the first ray out of range, or -1; if there is one, nothing
+    is traced.
     """
     tree = tree_pointers(descriptor)
     source, found = ray_pointers(rays, tree.scale), hit_pointers(out, out.shape[1])

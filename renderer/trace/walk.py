@@ -1,7 +1,7 @@
-"""The walk through a tree that all searches share: what a query does at a node and at a leaf is passed in.
+"""The traversal that all searches share; a query passes in its work at a node and at a leaf.
 
-As ``traverse_top_down`` of madmann91/bvh. Numba compiles a walk anew for the two kernels that it is given, and LLVM
-inlines both, so a walk costs what a loop of its own would.
+Like ``traverse_top_down`` of madmann91/bvh. Numba compiles a walk for each pair of kernels, and LLVM inlines both, so
+it costs no more than a loop of its own.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ def stack_size(depth: int) -> int:
 
 @inlined
 def blocks_of(leaf):
-    """The first block of a leaf, and how many it has. Python calls ``blocks_of.py_func``, for arrays too."""
+    """The first block of a leaf, and its number of blocks. Python calls ``blocks_of.py_func``, also for arrays."""
     return ~leaf >> LEAF_BITS, (~leaf & (MAX_LEAF_BLOCKS - 1)) + 1
 
 
@@ -36,7 +36,7 @@ def child_in(tree, node, octant):
 
 @inlined
 def push_children(tree, node, bits, stack, top):
-    """Let the children in the octants ``bits`` of a node wait on a stack, the last on top; returns the new top."""
+    """Push the children in the octants ``bits`` of a node onto a stack, the last on top. Returns the new top."""
     while bits != 0:
         store(stack, top, child_in(tree, node, lowest_bit(bits)))
         bits &= bits - 1
@@ -46,13 +46,13 @@ def push_children(tree, node, bits, stack, top):
 
 @inlined
 def walk(tree, stack, query, found, enter, visit):
-    """Walk from the root to every leaf that a query reaches, the last octants first; returns what was found.
+    """Walk from the root to every leaf that a query reaches, last octants first. Returns what was found.
 
     stack  pointer to ``stack_size`` int64
-    query  what both kernels read
-    found  what they find, at first nothing; of the same type throughout
-    enter  enter(tree, query, node, found): what is found at a node, and the bits of the octants to go on to
-    visit  visit(tree, query, first, count, found): what is found in the ``count`` blocks of a leaf from ``first`` on,
+    query  read by both kernels
+    found  the initial result; its type never changes
+    enter  enter(tree, query, node, found): the result after a node, and the bits of the octants to enter
+    visit  visit(tree, query, first, count, found): the result after the ``count`` blocks of a leaf from ``first`` on,
            and whether the walk ends there
 
     A tree without nodes is one leaf.
@@ -76,11 +76,11 @@ def walk(tree, stack, query, found, enter, visit):
 
 @inlined
 def walk_nearest_first(tree, stack, query, found, reaches, enter, visit):
-    """``walk`` in the order of distances, as far as ``enter`` pushes the octants of a node in that order.
+    """``walk`` in order of distance, if ``enter`` pushes the octants of a node in that order.
 
     reaches  reaches(query, k, found): whether the stack's k-th entry may still matter when its turn comes
-    enter    enter(tree, query, node, found, top): what is found at a node, and the stack's top above the octants that
-             it pushed, with what ``reaches`` reads of them
+    enter    enter(tree, query, node, found, top): the result after a node, and the stack's top above the octants that
+             it pushed, with the data that ``reaches`` reads
     """
     if not tree.has_nodes:
         found, _ = visit(tree, query, 0, tree.count, found)

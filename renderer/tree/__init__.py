@@ -1,1 +1,1 @@
-"""Trees: building, checking and refitting them."""
+"""Trees: built, checked, refitted and stored."""

@@ -1,4 +1,4 @@
-"""The blocks of triangles: the vertices of the faces in each, in the smallest type that holds them."""
+"""Blocks of triangles: the vertices of the faces in each, in the smallest type that represents them exactly."""
 
 from typing import Any
 
@@ -16,9 +16,9 @@ _VERTICES, _BLOCKS = 1 << 16, 1 << 12
 
 @kernel
 def _fill(vertices, faces, block_faces, address, wide, begin, end):
-    """Copy the vertices of each face of blocks ``begin:end`` into its rows; unused places hold NaN, which no ray meets.
+    """Copy the vertices of each face of blocks ``begin:end`` into its rows; unused places get NaN, which no ray hits.
 
-    The blocks stand at ``address``, float64 where ``wide``, else float32: one kernel for both.
+    The blocks are at ``address``, float64 if ``wide``, else float32: one kernel for both.
     """
     doubles, floats = float64_pointer(address), float32_pointer(address)
     for place in range(begin * BLOCK_FACES, end * BLOCK_FACES):
@@ -37,7 +37,7 @@ def _fill(vertices, faces, block_faces, address, wide, begin, end):
 def fill_blocks(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], block_faces: NDArray[np.int32], threads: int
 ) -> NDArray[Any]:
-    """The blocks whose faces are ``block_faces``, in float32 when that holds every vertex exactly, else float64."""
+    """The blocks with the faces ``block_faces``: float32 if that represents every vertex exactly, else float64."""
     inexact: list[int] = []
 
     def check(begin: int, end: int) -> None:

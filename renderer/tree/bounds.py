@@ -1,4 +1,4 @@
-"""The boxes of faces as the build sorts them, and the operations on boxes."""
+"""The boxes of faces that the build sorts, and operations on boxes."""
 
 from typing import NamedTuple
 
@@ -31,7 +31,7 @@ class Faces(NamedTuple):
 
 @kernel
 def face_boxes(vertices, faces, boxes, numbers, begin, end):
-    """The box of each face in ``begin:end``, as ``face_range`` has it."""
+    """The box of each face in ``begin:end``, by ``face_range``."""
     for f in range(begin, end):
         a, b, c = faces[f]
         base = f * BOX
@@ -44,7 +44,7 @@ def face_boxes(vertices, faces, boxes, numbers, begin, end):
 
 @inlined
 def empty_box():
-    """The union of no boxes."""
+    """The empty box, the neutral element of ``united``."""
     return splat8(np.float32(np.inf))
 
 

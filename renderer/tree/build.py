@@ -1,8 +1,8 @@
-"""Building the tree: the top is cut level by level, the subtrees below it are built in parallel, then both are joined.
+"""Builds the tree: cuts the top level by level, builds the subtrees below in parallel, then joins both.
 
-Faces are cut into a binary hierarchy, by octants at the midpoint or by the surface area heuristic, with fitted boxes;
-then parts of it are chosen as leaves and as children of nodes of eight. Where the top ends depends on the number of
-faces only, so that the tree is the same for any number of threads.
+Faces are cut into a binary hierarchy with fitted boxes, by octants at the midpoint or by the surface area heuristic.
+Parts of it then become leaves and children of nodes of eight. The end of the top depends only on the number of faces,
+so the tree is the same for any number of threads.
 """
 
 from typing import NamedTuple
@@ -30,7 +30,7 @@ _PARTS = 15
 
 
 class _Subtree(NamedTuple):
-    """A built subtree, its links counted from its own first node and block."""
+    """A built subtree; links count from its own first node and block."""
 
     nodes: NDArray[np.float32]
     block_faces: NDArray[np.int32]
@@ -42,7 +42,7 @@ class _Subtree(NamedTuple):
 def build_tree(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], rule: Rule, scale: float = 1.0, threads: int = 1
 ) -> Tree:
-    """Build the tree over all faces of vertices that were multiplied by ``scale``; without faces it has no nodes."""
+    """Build the tree over all faces; vertices are already multiplied by ``scale``. Without faces it has no nodes."""
     if not len(faces):
         return build_blocks(vertices, faces, scale, threads)
     top, subtrees = build_parts(vertices, faces, rule, threads)
@@ -56,7 +56,7 @@ def build_tree(
 
 
 def build_blocks(vertices: NDArray[np.float64], faces: NDArray[np.int32], scale: float = 1.0, threads: int = 1) -> Tree:
-    """The blocks alone, in the order of the faces, for a search without a tree."""
+    """The blocks alone, in the order of the faces, for tracing without a tree."""
     block_faces = np.full(-(-len(faces) // BLOCK_FACES) * BLOCK_FACES, -1, np.int32)
     block_faces[: len(faces)] = np.arange(len(faces))
     return Tree(np.empty(0, np.float32), fill_blocks(vertices, faces, block_faces, threads), block_faces, 0, scale)
@@ -65,7 +65,7 @@ def build_blocks(vertices: NDArray[np.float64], faces: NDArray[np.int32], scale:
 def build_parts(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], rule: Rule, threads: int
 ) -> tuple[Hierarchy, dict[int, _Subtree]]:
-    """The top of the hierarchy and the subtree of each whole part of it."""
+    """The top of the hierarchy, and the subtree of each of its whole parts."""
     boxes = cache_aligned(len(faces) * BOX, np.float32)
     order = Faces(boxes, boxes.view(np.int32), cache_aligned(len(boxes), np.float32))
     for_chunks(
@@ -76,7 +76,7 @@ def build_parts(
 
 
 def _cut_top(order: Faces, rule: Rule, threads: int) -> tuple[Hierarchy, list[int]]:
-    """Cut all faces until no part is larger than a subtree; also the levels of cuts above each part."""
+    """Cut all faces until no part is larger than a subtree; also return the number of cuts above each part."""
     count = len(order.boxes) // BOX
     top, levels = new_hierarchy(1), [0]
     add_part.py_func(top, 0, 0, count)  # a few words, not worth a kernel
@@ -96,7 +96,7 @@ def _cut_top(order: Faces, rule: Rule, threads: int) -> tuple[Hierarchy, list[in
 def _cut_each(
     order: Faces, rule: Rule, top: Hierarchy, levels: list[int], parts: list[int], threads: int
 ) -> list[tuple[Hierarchy, int]]:
-    """Cut each of ``parts`` once. Returns for each the hierarchy that it becomes, and the level of the new parts."""
+    """Cut each of ``parts`` once. Returns the resulting hierarchy of each, and the level of the new parts."""
     cut: dict[int, tuple[Hierarchy, int]] = {}
 
     def work(begin: int, end: int) -> None:

@@ -1,4 +1,4 @@
-"""The collapse of a binary hierarchy into nodes of eight children, by the choice of least expected cost.
+"""Collapses a binary hierarchy into nodes of eight children at least expected cost.
 
 Dynamic programming from the leaves up (Ylitie, Karras and Laine, Efficient Incoherent Ray Traversal on GPUs Through
 Compressed Wide BVHs, HPG 2017, sec. 3.1), with leaves counted in blocks.
@@ -25,12 +25,11 @@ def leaf_cost(tree, part):
 
 @kernel
 def collapse(tree, count, leaf_size):
-    """Fill ``costs`` and ``choices`` of ``count`` parts; ``costs[8 * part]`` of the whole parts must be set before.
+    """Fill ``costs`` and ``choices`` of ``count`` parts; ``costs[8 * part]`` of whole parts is set before.
 
-    costs[8 * part + i - 1] is the least cost of the part as at most i children of a node. The choice at that index is a
-    number of children. For i = 1 the part becomes a leaf where the choice is 0; else it becomes a node, of whose eight
-    children so many come from the part's first half. For i > 1 the part takes i - 1 children where the choice is 0,
-    because these cost no more; else so many of the i children come from its first half.
+    costs[8 * part + i - 1] is the least cost of the part as at most i children of a node. The choice at that index is
+    the number of children that come from the first half. For i = 1, a choice of 0 makes the part a leaf; otherwise it
+    becomes a node of eight children. For i > 1, a choice of 0 means that i - 1 children cost no more.
     """
     for part in range(count - 1, -1, -1):
         at = 8 * part
@@ -55,7 +54,7 @@ def collapse(tree, count, leaf_size):
 
 @kernel
 def _share(costs, first, children):
-    """The least cost of two halves as ``children`` children in all, and how many of them the first half gets."""
+    """The least cost of two halves as ``children`` children in total, and how many the first half gets."""
     left, right = 8 * first - 1, 8 * (first + 1) - 1
     best, chosen = costs[left + 1] + costs[right + children - 1], 1
     for k in range(2, children):

@@ -1,4 +1,4 @@
-"""Writing a collapsed hierarchy as nodes and leaves."""
+"""Writes a collapsed hierarchy as nodes and leaves."""
 
 from typing import NamedTuple
 
@@ -31,8 +31,8 @@ def emit_scratch() -> EmitScratch:
 def emit_nodes(tree, numbers, ends, nodes, links, block_faces, scratch):
     """Write the nodes below part 0, which becomes node 0, depth first. Returns (nodes, blocks, levels of nodes).
 
-    ``ends`` (n, 2) int32 holds the link and the levels below it for each whole part; when it is empty, whole parts and
-    those that ``collapse`` chose are written as leaves. ``nodes`` and ``links`` are the same memory.
+    ``ends`` (n, 2) int32 has the link and the levels below it for each whole part. If it is empty, whole parts and
+    those chosen by ``collapse`` are written as leaves. ``nodes`` and ``links`` are the same memory.
     """
     # Begin with part 0, which has no parent.
     waiting, shares = scratch.waiting, scratch.shares
@@ -67,15 +67,15 @@ def emit_nodes(tree, numbers, ends, nodes, links, block_faces, scratch):
 
 @inlined
 def _wait(waiting, top, part, level, link):
-    """Let a part wait to become the node of a level that ``link`` leads to; returns the new top."""
+    """Push a part that will become the node behind ``link``, on its level. Returns the new top."""
     waiting[top, 0], waiting[top, 1], waiting[top, 2] = part, level, link
     return top + 1
 
 
 @kernel
 def _next_child(tree, shares, shared):
-    """The part that takes the next place, and the number of shares that are left: the uppermost of ``shared`` shares
-    is shared out until one part takes one place.
+    """The part for the next place, and the number of shares left: the uppermost of ``shared`` shares is divided until
+    one part takes one place.
     """
     while True:
         shared -= 1
@@ -89,7 +89,7 @@ def _next_child(tree, shares, shared):
 
 @kernel
 def _first_shares(tree, part, shares):
-    """Start to share out a node's places; a part that ``collapse`` made no node has itself as its only child."""
+    """Begin to divide a node's places; a part that is no node is its own only child."""
     if tree.choices[8 * part] > 0:
         return _share_out(tree, part, tree.choices[8 * part], 8, shares, 0)
     shares[0, 0], shares[0, 1] = part, 1
@@ -98,7 +98,7 @@ def _first_shares(tree, part, shares):
 
 @kernel
 def _share_out(tree, part, left, share, shares, shared):
-    """Give ``left`` of a part's places to its first half, which goes on top, and the others to its second."""
+    """Give ``left`` of a part's places to its first half, which goes on top, and the rest to its second half."""
     first = tree.halves[part]
     shares[shared, 0], shares[shared, 1] = first + 1, share - left
     shares[shared + 1, 0], shares[shared + 1, 1] = first, left
@@ -113,7 +113,7 @@ def leaf_link(block, count):
 
 @kernel
 def emit_leaf(tree, part, numbers, block_faces, blocks):
-    """Write a part's faces to the blocks from ``blocks`` on, the last filled up with -1. Returns the block after it."""
+    """Write a part's faces to the blocks from ``blocks`` on, the last padded with -1. Returns the block after it."""
     begin, end = tree.ranges[part]
     at = blocks * BLOCK_FACES
     for i in range(begin, end):
@@ -144,13 +144,13 @@ def _set_bounds(nodes, base, place, boxes, box):
 
 @kernel
 def moved_link(link, node, block):
-    """The link of a subtree whose first node and block are ``node`` and ``block`` of the whole."""
+    """The link of a subtree whose first node and block are ``node`` and ``block`` in the whole tree."""
     return link + node if link >= 0 else link - (block << LEAF_BITS)
 
 
 @kernel
 def place_subtree(words, block_faces, node, block, links, all_block_faces):
-    """Copy a subtree's nodes, as int32, and the faces of its blocks to the whole: from ``node`` and ``block`` on."""
+    """Copy a subtree's nodes, as int32, and the faces of its blocks to the whole, from ``node`` and ``block`` on."""
     base = node * NODE_WORDS
     for i in range(len(words)):
         links[base + i] = words[i]

@@ -1,4 +1,4 @@
-"""The binary hierarchy that a split rule makes of faces, before it is collapsed into nodes of eight."""
+"""The binary hierarchy that a split rule makes of faces, before it becomes nodes of eight."""
 
 from typing import NamedTuple
 
@@ -14,7 +14,9 @@ MIDPOINT, SAH = 0, 1
 
 
 class Rule(NamedTuple):
-    """The rule of a build: the split rule, the most faces of a leaf, and the deepest level that the rule may split."""
+    """The rule of a build: the split rule, the largest number of faces of a leaf, and the deepest level that it may
+    split.
+    """
 
     split: int
     leaf_size: int
@@ -22,7 +24,7 @@ class Rule(NamedTuple):
 
 
 class Hierarchy(NamedTuple):
-    """Parts: ranges of faces, each whole or cut in two halves, which stand side by side, after the part itself.
+    """Parts: ranges of faces, each whole or cut in two halves, which are stored side by side after the part itself.
 
     boxes    (n * BOX,) float32, their bounds
     ranges   (n, 2) int32, begin and end

@@ -1,6 +1,4 @@
-"""Checks of what a traversal takes for granted about a tree: all of it, slow and plain, for tests and reports; and, for
-trees from files, what it could crash at.
-"""
+"""Checks of what a traversal relies on: complete and slow for tests and reports, and quick for trees from files."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +11,11 @@ from renderer.trace.walk import blocks_of
 
 
 def faults(tree: Tree, mesh: Mesh) -> list[str]:
-    """The faults of ``tree`` as the octree of ``mesh``, in words; empty when all of these hold.
+    """The faults of ``tree`` as the octree of ``mesh``, in words; empty if all of these hold.
 
     Every node and block is reached exactly once; without faces there is none. A child's box contains its descendants'
-    and the boxes of its faces, see ``intersect.face_range``. Every face with its own vertices stands in exactly one
-    place. No path is longer than ``tree.depth``. Unused places hold no face and no area; unused octants have inverted
+    and the boxes of its faces, see ``intersect.face_range``. Every face, with its own vertices, is in exactly one
+    place. No path is longer than ``tree.depth``. Unused places have no face and no area; unused octants have inverted
     boxes.
     """
     found = _block_faults(tree, mesh)
@@ -98,10 +96,10 @@ def _block_faults(tree: Tree, mesh: Mesh) -> list[str]:
 
 
 def check_safe(tree: Tree, face_count: int) -> None:
-    """Raise ``ValueError`` for what leads a traversal out of the arrays, round in circles or beyond its stack.
+    """Raise ``ValueError`` for a tree that leads a traversal out of the arrays, into a cycle or beyond its stack.
 
-    Quick, for trees from files. Whether boxes and blocks are those of the mesh is not checked: wrong ones lead to wrong
-    hits, and to nothing worse.
+    Quick, for trees from files. Boxes and blocks are not compared with the mesh: wrong ones cause wrong hits, and
+    nothing worse.
     """
     blocks = len(tree.faces) // BLOCK_FACES
     stored = len(tree.blocks) // BLOCK_WORDS

@@ -1,4 +1,4 @@
-"""The midpoint rule: the octants about the middle of a box, eight where it is nearly a cube, as binary cuts."""
+"""The midpoint rule: octants about the middle of a box, as binary cuts; eight if the box is nearly a cube."""
 
 from typing import NamedTuple
 
@@ -27,9 +27,8 @@ def octant_scratch() -> OctantScratch:
 def cut_octants(faces, tree, part, whole, count, scratch):
     """Cut a part into octants about the middle of its box. Returns the number of parts, which was ``count`` before.
 
-    The part is cut in two along the longest axis first, and halves of at most ``whole`` faces are not cut further.
-    Where all faces lie in one octant, the middle of their centres is taken instead; where that separates none either,
-    nothing is cut.
+    The part is cut in two along the longest axis first, and halves of at most ``whole`` faces are not cut further. If
+    all faces lie in one octant, the middle of their centres is used instead; if that separates none, nothing is cut.
     """
     # Sort the faces by octant.
     begin, end = tree.ranges[part]
@@ -64,8 +63,8 @@ def cut_octants(faces, tree, part, whole, count, scratch):
 
 @kernel
 def _without_empty_halves(starts, first, width):
-    """Of ``width`` octants from ``first`` on those that are left when empty halves are passed over: the first, and how
-    many.
+    """The octants left of ``width`` octants from ``first`` on when empty halves are skipped: the first, and their
+    number.
     """
     while width > 1:
         half = width // 2
@@ -82,8 +81,8 @@ def _without_empty_halves(starts, first, width):
 def _box_middle(boxes, base):
     """The axes of the box at word ``base``, longest first, and the doubled middle along each.
 
-    It is infinite, so that nothing is cut, along an axis that is not half as long as the longest: in an octree of cubes
-    the box is one layer of cells. To cut such boxes costs rays at terrains a fifth more nodes.
+    Along an axis less than half as long as the longest it is infinite, so that nothing is cut: in an octree of cubes
+    the box is one layer of cells. Cutting such boxes costs rays a fifth more nodes on terrains.
     """
     x = -boxes[base + 4] - boxes[base]
     y = -boxes[base + 5] - boxes[base + 1]

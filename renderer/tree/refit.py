@@ -1,4 +1,4 @@
-"""Refitting a tree to moved vertices: the same nodes and leaves, with new boxes and blocks."""
+"""Refits a tree to moved vertices: the same nodes and leaves, with new boxes and blocks."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +37,7 @@ def _fit_leaves(vertices, faces, block_faces, nodes, links, begin, end):
 
 @kernel
 def _fit_leaf(vertices, faces, block_faces, first, last, nodes, at):
-    """Set the box whose words are ``at``, ``at + 8``, ... to the union of those of the faces in ``first:last``."""
+    """Set the box whose words are ``at``, ``at + 8``, ... to the union of the boxes of the faces in ``first:last``."""
     for axis in range(3):
         low, high = np.float32(np.inf), np.float32(-np.inf)
         for i in range(first, last):

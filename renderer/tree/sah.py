@@ -15,7 +15,7 @@ _MOST_BINS = 16
 
 
 class Bins(NamedTuple):
-    """Where the bins of each axis start, how many of them there are a unit of length, and on each axis."""
+    """The start of the bins of each axis, their number for each unit of length, and their number on each axis."""
 
     low: tuple
     scale: tuple
@@ -37,8 +37,8 @@ def bin_scratch() -> BinScratch:
 
 @kernel
 def cut_sah(faces, tree, part, count, scratch):
-    """Cut a part in two at the cheapest plane, cost counted in blocks. Returns the number of parts, which was ``count``
-    before and stays so where no plane separates the centres.
+    """Cut a part in two at the cheapest plane, with cost counted in blocks. Returns the number of parts; it stays
+    ``count`` if no plane separates the centres.
     """
     begin, end = tree.ranges[part]
     # Sort the faces into bins.
@@ -65,7 +65,7 @@ def cut_sah(faces, tree, part, count, scratch):
 
 @kernel
 def _spread_bins(boxes, begin, end, count):
-    """The ``Bins`` between the centres of some faces; where these do not differ, none a unit of length."""
+    """The ``Bins`` between the centres of some faces; none along an axis on which these are equal."""
     x0 = y0 = z0 = np.float32(np.inf)
     x1 = y1 = z1 = np.float32(-np.inf)
     for i in range(begin, end):
@@ -126,7 +126,7 @@ def _best_plane(scratch, first, bins):
 
 @kernel
 def _partition(faces, begin, end, bins, axis, last):
-    """Stable partition: faces up to the ``last`` bin before the plane first. Returns where those beyond it begin."""
+    """Stable partition: faces up to the ``last`` bin before the plane come first. Returns the start of the others."""
     boxes, spare = faces.boxes, faces.spare
     left, right = begin, begin
     for i in range(begin, end):

@@ -9,7 +9,8 @@ do, so that a map of the file can be traced as it stands.
     bytes 16-19   uint32, the bytes of the header's text with the spaces that fill it up
     bytes 20-23   uint32, the CRC-32 (as zlib has it) of bytes 0-19 and the text
     bytes 24-     the text, JSON: {"depth": 8, "scale": 1.0, "name": "teapot", "arrays": [{"name": "vertices",
-                  "dtype": "<f8", "rows": 163842, "crc32": 305419896}, ...]}
+                  "dtype": "<f8", "rows": 163842, "crc32": 305419896}, ...]}; of a mesh of several parts also
+                  "parts": [["body", 900], ["wheel", 120], ...], the name and the number of faces of each
     then          the arrays in the text's order, each filled up with zeros, which its CRC-32 counts too
 
 ``_KINDS`` has the arrays that there are. ``trace.layout`` describes nodes and blocks; "block_faces" is ``Tree.faces``.
@@ -33,8 +34,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.arguments.counts import is_count
-from renderer.errors import expect
-from renderer.mesh.mesh import Mesh, Repairs
+from renderer.errors import NoSuchFileError, expect
+from renderer.mesh.mesh import Mesh, Repairs, give_parts
+from renderer.mesh.parts import Part, parts_of
 from renderer.system.files import as_path, write_atomically
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CACHE_LINE, NODE_WORDS, Tree, cache_aligned, locked
 from renderer.tree.invariants import check_safe
@@ -99,6 +101,7 @@ class _Header(NamedTuple):
     depth: int
     scale: float
     name: str
+    parts: tuple[Part, ...]
     sections: dict[str, _Section]
 
 
@@ -127,6 +130,8 @@ def load_octree(path: str | os.PathLike[str], mapped: bool) -> Stored:
             header = _read_header(file)
             arrays = _mapped(file, header.sections) if mapped else _read(file, header.sections)
         return _stored(header, arrays)
+    except FileNotFoundError as error:
+        raise NoSuchFileError(f"{source}: cannot be read: {error.strerror}") from error
     except OSError as error:
         raise ValueError(f"{source}: cannot be read: {error.strerror or error}") from error
     except ValueError as error:
@@ -165,7 +170,9 @@ def _head_of(stored: Stored, arrays: Arrays) -> bytes:
         crc = zlib.crc32(_zeros_after(memory), zlib.crc32(memory))
         listed.append({"name": name, "dtype": array.dtype.str, "rows": array.size // math.prod(row), "crc32": crc})
     described = {"depth": int(stored.tree.depth), "scale": float(stored.tree.scale), "name": stored.mesh.name}
-    text = json.dumps({**described, "arrays": listed}).encode("ascii")
+    parts = stored.mesh._parts
+    named = {"parts": [[part.name, part.faces.stop - part.faces.start] for part in parts]} if parts else {}
+    text = json.dumps({**described, **named, "arrays": listed}).encode("ascii")
     before = _START.size + _CRC.size
     text = text.ljust(_filled(before + len(text)) - before)
     start = _START.pack(_MAGIC, _ORDER, VERSION, len(text))
@@ -210,13 +217,14 @@ def _parsed(text: bytes, begin: int) -> tuple[_Header, int]:
     except (ValueError, RecursionError) as error:
         raise ValueError(f"header: expected JSON, got {error}") from None
     keys = ["depth", "scale", "name", "arrays"]
-    good = isinstance(described, dict) and sorted(described) == sorted(keys)
-    expect(good, "header", f"the keys {keys}", _shown(described))
+    good = isinstance(described, dict) and sorted({"parts", *described}) == sorted([*keys, "parts"])
+    expect(good, "header", f"the keys {keys}, or also 'parts'", _shown(described))
     depth, scale, name, listed = (described[key] for key in keys)
     expect(is_count(depth, 0, _MAX_LEVELS), "depth", f"an integer from 0 to {_MAX_LEVELS}", _shown(depth))
     good = isinstance(scale, float) and math.frexp(scale)[0] == 0.5
     expect(good, "scale", "a power of two", _shown(scale))
     expect(isinstance(name, str), "name", "a string", _shown(name))
+    parts = _parts(described.get("parts", []))
     expect(isinstance(listed, list), "arrays", "a list", _shown(listed))
     sections: dict[str, _Section] = {}
     for entry in listed:
@@ -225,7 +233,17 @@ def _parsed(text: bytes, begin: int) -> tuple[_Header, int]:
         sections[of], begin = section, section.end
     missing = _ALWAYS - sections.keys()
     expect(not missing, "arrays", f"{sorted(_ALWAYS)}", f"none for {sorted(missing)}")
-    return _Header(depth, scale, name, sections), begin
+    return _Header(depth, scale, name, parts, sections), begin
+
+
+def _parts(listed: Any) -> tuple[Part, ...]:
+    """The parts of the mesh, none if it has one only."""
+    good = isinstance(listed, list) and all(
+        isinstance(entry, list) and len(entry) == 2 and isinstance(entry[0], str) and is_count(entry[1], 0, 2**32 - 1)
+        for entry in listed
+    )
+    expect(good, "parts", "pairs of a name and a number of faces", _shown(listed))
+    return parts_of([name for name, _ in listed], [count for _, count in listed])
 
 
 def _section(entry: Any, begin: int) -> tuple[str, _Section]:
@@ -269,7 +287,10 @@ def _mapped(file: BufferedReader, sections: dict[str, _Section]) -> Arrays:
 
 def _stored(header: _Header, arrays: Arrays) -> Stored:
     """Mesh, tree and repairs over the arrays of a file, checked so far that tracing is safe."""
-    mesh = Mesh.viewing({name: arrays[name] for name in _OF_MESH if name in arrays}, header.name)
+    mesh = Mesh._viewing({name: arrays[name] for name in _OF_MESH if name in arrays}, header.name)
+    counted = header.parts[-1].faces.stop if header.parts else len(mesh.faces)
+    expect(counted == len(mesh.faces), "parts", f"{len(mesh.faces)} faces in all", counted)
+    give_parts(mesh, header.parts)
     nodes, blocks, faces = (arrays[name].reshape(-1) for name in ("nodes", "blocks", "block_faces"))
     tree = Tree(nodes, blocks, faces, header.depth, header.scale)
     check_safe(tree, len(mesh.faces))

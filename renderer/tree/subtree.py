@@ -1,4 +1,4 @@
-"""One subtree, from the faces of a range to nodes and leaves, in memory of its own."""
+"""Builds one subtree, from a range of faces to nodes and leaves, in memory of its own."""
 
 from typing import NamedTuple
 
@@ -21,7 +21,7 @@ _FEW = 32
 
 
 class CutScratch(NamedTuple):
-    """Scratch for one subtree: that of both split rules, and that of ``emit_nodes``, which ``_cut_all`` uses too."""
+    """Scratch for one subtree: for both split rules, and for ``emit_nodes``, which ``_cut_all`` shares."""
 
     octants: OctantScratch
     bins: BinScratch
@@ -29,7 +29,7 @@ class CutScratch(NamedTuple):
 
 
 class SubtreeScratch(NamedTuple):
-    """Memory in which one subtree at a time is built."""
+    """Memory to build one subtree at a time."""
 
     tree: Hierarchy
     cut: CutScratch
@@ -45,7 +45,7 @@ def new_cut_scratch() -> CutScratch:
 
 
 def new_subtree_scratch(faces: int) -> SubtreeScratch:
-    """Memory for subtrees of up to ``faces`` faces, most of which a subtree leaves untouched."""
+    """Memory for subtrees of up to ``faces`` faces; a subtree leaves most of it untouched."""
     nodes = np.empty(max(1, faces) * NODE_WORDS, np.float32)
     tree = new_hierarchy(max(1, 2 * faces - 1))
     block_faces, no_ends = np.empty(faces * BLOCK_FACES, np.int32), np.empty((0, 2), np.int32)
@@ -54,8 +54,8 @@ def new_subtree_scratch(faces: int) -> SubtreeScratch:
 
 @kernel
 def cut_part(faces, tree, part, rule, level, count, scratch):
-    """Cut a part by the rule, or in half where the rule cannot or has cut ``max_depth`` levels. Returns the number of
-    parts, which was ``count`` before, and the level of the new ones. A level is one cut in two; octants are three.
+    """Cut a part by the rule; or in equal halves if the rule cannot, or has cut ``max_depth`` levels. Returns the
+    number of parts, ``count`` before, and the level of the new ones. A cut in two is one level; octants are three.
     """
     after, below = count, level + 1
     if level < 3 * rule.max_depth:
@@ -70,7 +70,7 @@ def cut_part(faces, tree, part, rule, level, count, scratch):
 
 @kernel
 def _cut_in_half(faces, tree, part, count):
-    """Cut a part into equal halves where no rule separates its faces, so that the build ends."""
+    """Cut a part into equal halves if no rule separates its faces, so that the build ends."""
     begin, end = tree.ranges[part]
     middle = (begin + end) // 2
     tree.halves[part] = count
@@ -110,7 +110,7 @@ def cut_once(faces, tree, rule, level, scratch):
 
 @kernel
 def build_subtree(faces, rule, begin, end, level, scratch):
-    """Build over the faces ``begin:end``, which were cut off by ``level`` cuts, into ``scratch``.
+    """Build over the faces ``begin:end``, the result of ``level`` cuts, into ``scratch``.
 
     Returns (link, cost, nodes, blocks, levels of nodes), the link counted from the subtree's own first node and block.
     A subtree of one leaf has no node, unless it is the whole tree, which always begins with a node.

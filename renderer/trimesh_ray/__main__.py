@@ -9,9 +9,9 @@ from renderer.trimesh_ray.install import install
 _USAGE = "usage: python -m renderer.trimesh_ray [--proximity] script.py [arguments of the script]"
 _HELP = f"""{_USAGE}
 
-Run a script with renderer.trimesh_ray installed: its trimesh then asks the octree.
+Run a script with renderer.trimesh_ray installed: its trimesh then uses the octree.
 
-  --proximity  nearest points and signed distances too"""
+  --proximity  for nearest points and signed distances too"""
 
 
 def main() -> None:

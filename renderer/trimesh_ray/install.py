@@ -1,11 +1,12 @@
 """Installed, new meshes of trimesh get intersectors of ours, where they would get those over embreex."""
 
 import copyreg
-import importlib
+import importlib.util
 import sys
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from threading import RLock
 from types import ModuleType
 from typing import Any
@@ -22,13 +23,26 @@ _changing = RLock()
 
 
 def install(proximity: bool = False) -> None:
-    """Let every ``trimesh.Trimesh`` made from now on trace its rays here; those made before keep what they have.
+    """Let every ``trimesh.Trimesh`` made from now on trace its rays by the octree; earlier meshes stay as they are.
 
-    proximity  whether ``trimesh.proximity``'s ``closest_point`` and ``signed_distance`` answer by ours too, for all
-               meshes, and with them ``mesh.nearest``, ``thickness`` and ``max_tangent_sphere``
+    May be called again, for instance to add ``proximity``. ``uninstall`` undoes it. Names that were imported from
+    trimesh before stay as they are, and a mesh made with ``use_embree=False`` keeps trimesh's own intersector.
 
-    May be called again, as to add ``proximity``. Undone by ``uninstall()``. Names imported from trimesh before keep
-    what they name, and a mesh made with ``use_embree=False`` has trimesh's own intersector.
+    Parameters
+    ----------
+    proximity : bool, default False
+        Also answer ``closest_point`` and ``signed_distance`` of ``trimesh.proximity`` for all meshes, and with them
+        ``mesh.nearest``, ``thickness`` and ``max_tangent_sphere``. If rtree or SciPy is missing, without which
+        trimesh's own functions fail, this is always done.
+
+    Examples
+    --------
+    >>> import trimesh
+    >>> from renderer import trimesh_ray
+    >>> trimesh_ray.install()
+    >>> trimesh.creation.box().ray.intersects_any([[0, 0, 2]], [[0, 0, -1]])
+    array([ True])
+    >>> trimesh_ray.uninstall()
     """
     with _changing:
         _installed.add(bool(proximity))
@@ -36,7 +50,7 @@ def install(proximity: bool = False) -> None:
 
 
 def uninstall() -> None:
-    """Take back ``install()``; does nothing where nothing is installed. Blocks of ``installed()`` go on."""
+    """Undo ``install``; does nothing if nothing is installed. Blocks of ``installed`` go on."""
     with _changing:
         _installed.clear()
         _apply()
@@ -44,7 +58,21 @@ def uninstall() -> None:
 
 @contextmanager
 def installed(proximity: bool = False) -> Iterator[None]:
-    """``install()`` for a block; blocks may overlap, on several threads too."""
+    """Install for a ``with`` block. Blocks may overlap, also on several threads.
+
+    Parameters
+    ----------
+    proximity : bool, default False
+        As for ``install``.
+
+    Examples
+    --------
+    >>> import trimesh
+    >>> from renderer.trimesh_ray import installed
+    >>> with installed(proximity=True):
+    ...     trimesh.creation.box().nearest.signed_distance([[0, 0, 0.25]])
+    array([0.25])
+    """
     with _changing:
         _blocks[bool(proximity)] += 1
         _apply()
@@ -61,7 +89,7 @@ def _apply() -> None:
     wanted = _installed | {*_blocks.elements()}
     names = [("trimesh.ray", "ray_pyembree"), ("trimesh.ray", "has_embree"), (_MODULES, "trimesh.ray.ray_pyembree")]
     ours = dict(zip(names, (intersector, True, intersector), strict=True)) if wanted else {}
-    if True in wanted:
+    if True in wanted or (wanted and not _trimesh_finds_points()):
         for name in ("closest_point", "signed_distance"):
             ours["trimesh.proximity", name] = getattr(distances, name)
     for key in [key for key in _before if key not in ours]:
@@ -71,6 +99,11 @@ def _apply() -> None:
             _before[key] = _get(*key)
             _keep_picklable(_before[key])
             _set(*key, value)
+
+
+def _trimesh_finds_points() -> bool:
+    """Whether trimesh's own ``closest_point`` has what it needs."""
+    return all(importlib.util.find_spec(name) is not None for name in ("rtree", "scipy"))
 
 
 def _keep_picklable(module: Any) -> None:
@@ -100,4 +133,4 @@ def _set(place: str, name: str, value: Any) -> None:
 
 
 def _module(name: str) -> Any:
-    return importlib.import_module(name)
+    return import_module(name)

@@ -1,11 +1,12 @@
 """A ``RayMeshIntersector`` like trimesh's own two, answered by the octree."""
 
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Any, Literal, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.trimesh_ray.trees import traced
 from renderer.trimesh_ray.within import points_within
@@ -19,13 +20,22 @@ _FIRST: Literal["first"] = "first"
 
 
 class RayMeshIntersector:
-    """Rays of one mesh, with the methods, arguments and results of trimesh's intersectors.
+    """The rays of one mesh, with the methods, arguments and results of trimesh's intersectors.
 
-    Unlike those it lists each place where a ray passes the surface once, however close the places lie, at edges and
-    corners too; t = 0 counts, to rounding, and a ray in a face's plane misses that face. Of faces at one place, as in a
-    body that is there twice, the first is named. Rows come by ray, then by distance. A ray whose origin or direction is
-    not finite, or whose direction is 0, misses, and every ray misses a face with a corner that is not finite.
+    Unlike those it lists each place where a ray passes the surface once, however close the places lie, also at edges
+    and corners. t = 0 counts, to rounding. A ray in a face's plane misses that face. Of coinciding faces the first is
+    named. Rows are sorted by ray, then by distance. A ray that is not finite or has no direction misses, and every ray
+    misses a face with a corner that is not finite.
 
+    Parameters
+    ----------
+    geometry : trimesh.Trimesh
+        The mesh. The tree is built by the first query, and again after an edit.
+    scale_to_box : bool, default True
+        Ignored; nothing is scaled.
+
+    Examples
+    --------
     >>> import trimesh
     >>> from renderer.trimesh_ray import RayMeshIntersector
     >>> mesh = trimesh.creation.box()
@@ -36,10 +46,37 @@ class RayMeshIntersector:
     """
 
     def __init__(self, geometry: Any, scale_to_box: bool = True) -> None:
-        """``scale_to_box`` is taken and not needed: nothing is scaled."""
         self.mesh = geometry
         self._scale_to_box = scale_to_box
 
+    @overload
+    def intersects_id(
+        self,
+        ray_origins: ArrayLike,
+        ray_directions: ArrayLike,
+        multiple_hits: bool = True,
+        max_hits: int = 100,
+        return_locations: Literal[False] = False,
+    ) -> tuple[Integers, Integers]: ...
+    @overload
+    def intersects_id(
+        self,
+        ray_origins: ArrayLike,
+        ray_directions: ArrayLike,
+        multiple_hits: bool = True,
+        max_hits: int = 100,
+        *,
+        return_locations: Literal[True],
+    ) -> tuple[Integers, Integers, Floats]: ...
+    @overload
+    def intersects_id(
+        self,
+        ray_origins: ArrayLike,
+        ray_directions: ArrayLike,
+        multiple_hits: bool = True,
+        max_hits: int = 100,
+        return_locations: bool = False,
+    ) -> tuple[Integers, Integers] | tuple[Integers, Integers, Floats]: ...
     def intersects_id(
         self,
         ray_origins: ArrayLike,
@@ -48,12 +85,25 @@ class RayMeshIntersector:
         max_hits: int = 100,
         return_locations: bool = False,
     ) -> tuple[Integers, Integers] | tuple[Integers, Integers, Floats]:
-        """Faces (m,) and rays (m,) of all hits, or of the first of each ray; with their places (m, 3) if asked for.
+        """Return the faces and rays of all hits, or of the first hit of each ray.
 
-        ray_origins, ray_directions  (n, 3)
-        multiple_hits                whether all hits of a ray are listed, at most the nearest ``max_hits``
+        Parameters
+        ----------
+        ray_origins, ray_directions : array_like, shape (n, 3)
+        multiple_hits : bool, default True
+            List all hits of a ray; if False, the first.
+        max_hits : int, default 100
+            List at most this many hits of a ray, the nearest.
+        return_locations : bool, default False
+            Return the hit points too.
+
+        Returns
+        -------
+        faces : ndarray of int64, shape (m,)
+        rays : ndarray of int64, shape (m,)
+        locations : ndarray of float64, shape (m, 3)
+            Only with ``return_locations``.
         """
-
         kept = max_hits if multiple_hits else _FIRST
         faces, rays, places = self._hits(ray_origins, ray_directions, kept, return_locations)
         return (faces, rays, places) if return_locations else (faces, rays)
@@ -61,7 +111,20 @@ class RayMeshIntersector:
     def intersects_location(
         self, ray_origins: ArrayLike, ray_directions: ArrayLike, multiple_hits: bool = True
     ) -> tuple[Floats, Integers, Integers]:
-        """Places (m, 3), rays (m,) and faces (m,) of all hits, or of the first of each ray."""
+        """Return the points, rays and faces of all hits, or of the first hit of each ray.
+
+        Parameters
+        ----------
+        ray_origins, ray_directions : array_like, shape (n, 3)
+        multiple_hits : bool, default True
+            List all hits of a ray; if False, the first.
+
+        Returns
+        -------
+        locations : ndarray of float64, shape (m, 3)
+        rays : ndarray of int64, shape (m,)
+        faces : ndarray of int64, shape (m,)
+        """
         faces, rays, places = self._hits(ray_origins, ray_directions, None if multiple_hits else _FIRST, True)
         return places, rays, faces
 
@@ -89,7 +152,17 @@ class RayMeshIntersector:
         return faces, rays, places
 
     def intersects_first(self, ray_origins: ArrayLike, ray_directions: ArrayLike) -> Integers:
-        """The first face that each ray hits, (n,); -1 for none."""
+        """Return the first face that each ray hits.
+
+        Parameters
+        ----------
+        ray_origins, ray_directions : array_like, shape (n, 3)
+
+        Returns
+        -------
+        ndarray of int64, shape (n,)
+            -1 on a miss.
+        """
 
         def ask(origins: Floats, directions: Floats) -> Integers:
             it = traced(self.mesh)
@@ -99,17 +172,34 @@ class RayMeshIntersector:
         return faces if good is None else np.where(good, faces, -1)
 
     def intersects_any(self, ray_origins: ArrayLike, ray_directions: ArrayLike) -> NDArray[np.bool_]:
-        """Whether each ray hits the mesh, (n,)."""
+        """Return whether each ray hits the mesh.
+
+        Parameters
+        ----------
+        ray_origins, ray_directions : array_like, shape (n, 3)
+
+        Returns
+        -------
+        ndarray of bool, shape (n,)
+        """
         hit, good = _asked(lambda o, d: traced(self.mesh).octree.any_hit(o, d), ray_origins, ray_directions)
         return hit if good is None else hit & good
 
     def contains_points(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Whether each point (n, 3) lies inside, (n,): by parity as in trimesh.
+        """Return whether each point lies inside, by parity as in trimesh.
 
-        Faces at one place count once, as for a body that is there twice; but both walls of two bodies that touch count.
-        Of an open mesh whose faces are turned one way it is whether the surface winds around the point by more than a
-        half; of any other it is a vote of two opposite rays, as in trimesh, and of two more where they differ. A point
-        on the surface is inside; one that is not finite is outside, as is any beyond the mesh's box.
+        Coinciding faces count once, as for a body that is there twice, but both walls of two bodies that touch count.
+        For an open mesh with consistent winding, a point is inside if the winding number is above 1/2. For any other
+        open mesh two opposite rays vote, as in trimesh, and two more if they differ.
+
+        Parameters
+        ----------
+        points : array_like, shape (n, 3)
+
+        Returns
+        -------
+        ndarray of bool, shape (n,)
+            True on the surface; False for a point that is not finite.
         """
         given = as_rows("points", points)
         if len(self.mesh.faces) == 0:

@@ -64,7 +64,7 @@ class Viewer:
         return [self.shown, *(session.shown.whole for session in self.sessions)]
 
     def _kept(self, shown: ShownScene) -> ShownScene:
-        """``shown``, which can be found by its id from now on, and is the server's own if it is of its file."""
+        """Keep ``shown`` so that its id finds it; it replaces the server's own scene if both have one file."""
         if shown.path == self.shown.path:
             self.shown = shown
         self._scenes[shown.id] = shown
@@ -78,7 +78,7 @@ class Viewer:
             return shown
 
     def _asked_for(self, request: Request) -> ShownScene:
-        """The scene with the id of the request, or without one the server's own. Raises a 404 where it is gone."""
+        """The scene with the id of the request, by default the server's own. Raises a 404 if it is gone."""
         wanted = request.query_params.get("id", self.shown.id)
         if (shown := self._scenes.get(wanted)) is None:
             raise HTTPException(404, f"id: expected that of a scene that is shown, got {wanted[:40]!r}")
@@ -122,31 +122,36 @@ class Viewer:
             await asyncio.gather(running, return_exceptions=True)
 
     async def stop(self) -> None:
-        """Begin nothing more."""
+        """Start no more computations."""
         for threads in (self._threads, self.files):
             threads.shutdown(wait=False, cancel_futures=True)
 
 
 def _opened(own: ShownScene, known: list[ShownScene], file: str, fresh: bool) -> ShownScene:
-    """The scene of ``file``, beside the server's ``own``: one of those ``known`` where it will do, or loaded anew."""
+    """The scene of ``file`` beside the server's ``own``: one of ``known`` that is up to date, or a new one."""
     if own.path is None and not fresh:
         return own
     path = own.beside(file) if fresh or file in own.files else own.path
     assert path is not None  # which mypy cannot tell
-    return open_file(path) if fresh else _unedited(known, path)
+    return _loaded(known, path) if fresh else _unedited(known, path)
 
 
 def _current(shown: ShownScene, known: list[ShownScene]) -> ShownScene:
-    """``shown``, or where its files were edited since, the scene that they hold now."""
+    """``shown``, or a new scene if its files were edited since."""
     return shown if shown.path is None else _unedited([shown, *known], shown.path)
 
 
 def _unedited(known: list[ShownScene], path: Path) -> ShownScene:
-    """The scene of the file: one of those ``known`` where it is as the file has it, or loaded anew."""
+    """The scene of the file: one of ``known`` that is up to date, or a new one."""
     for scene in known:
         if scene.path == path and not scene.edited:
             return scene
-    return open_file(path)
+    return _loaded(known, path)
+
+
+def _loaded(known: list[ShownScene], path: Path) -> ShownScene:
+    """The scene of the file, loaded again; a mesh file keeps its axis ``up``."""
+    return open_file(path, next((scene.up for scene in known if scene.path == path), None))
 
 
 def _stream(payload: Payload) -> Response:
@@ -155,7 +160,7 @@ def _stream(payload: Payload) -> Response:
 
 
 def _telling(send: Callable[[Any], Awaitable[None]]) -> Callable[[Any], Awaitable[None]]:
-    """``send`` that raises ``WebSocketDisconnect`` where the page has gone, in place of a ``RuntimeError``."""
+    """``send``, which raises ``WebSocketDisconnect`` instead of ``RuntimeError`` when the page has gone."""
 
     async def tell(message: Any) -> None:
         try:
@@ -167,7 +172,7 @@ def _telling(send: Callable[[Any], Awaitable[None]]) -> Callable[[Any], Awaitabl
 
 
 async def _receive_all(socket: WebSocket, session: Session) -> None:
-    """Pass messages on until the page leaves."""
+    """Pass messages to the session until the page leaves."""
     while (message := await socket.receive())["type"] == "websocket.receive":
         if message.get("text") is not None:
             await session.receive(message["text"])

@@ -29,7 +29,7 @@ _STEPS = 8
 
 
 def saved(shown: ShownScene, message: SaveCamera) -> str:
-    """The camera as TOML, and with settings their tables too: what the file of the scene has, but for these."""
+    """The camera as TOML, and with ``settings`` the tables [render] and [[lights]] too."""
     camera = _seen_by(shown, message, message.walk)
     text = camera_toml(camera)
     if message.settings is None:
@@ -64,7 +64,8 @@ def command_of(shown: ShownScene, asked: AskCommand) -> str:
         changes.append(f"lights = [{', '.join(map(_inline, lights_of(shown, settings)))}]")
     if settings.shadows != scene.render.shadows:
         changes.append(f"render.shadows = {_value(settings.shadows)}")
-    words = ["octree-render", "render", _as_word(str(path)), "--resolution", f"{asked.w}x{asked.h}"]
+    words = ["octree-render", "render", _as_word(str(path)), *(["--up", shown.up] if shown.up else [])]
+    words += ["--resolution", f"{asked.w}x{asked.h}"]
     words += ["--samples", str(1 if brute else settings.samples), "--max-depth", str(settings.max_depth)]
     words += ["--accelerator", "brute"] if brute else []
     words += [word for change in changes for word in ("--change", change)]
@@ -72,7 +73,7 @@ def command_of(shown: ShownScene, asked: AskCommand) -> str:
 
 
 def _as_word(file: str) -> str:
-    """The name of a file so that no command takes it for an option."""
+    """The name of a file as an argument that is not mistaken for an option."""
     return f"./{file}" if file.startswith("-") else file
 
 
@@ -95,7 +96,7 @@ def _seen_by(shown: ShownScene, message: SaveCamera | SaveScene, walk: bool = Fa
 
 
 def _distances(ahead: float) -> Iterator[float]:
-    """Distances of few bits about ``ahead``, the nearest first."""
+    """Distances near ``ahead`` that have few bits, the nearest first."""
     exponent = math.frexp(ahead)[1] - 1
     about = (math.ldexp(1.0 + step / _STEPS, exponent) for step in range(-_STEPS // 2, _STEPS + 1))
     return iter(sorted(about, key=lambda distance: abs(distance - ahead)))
@@ -150,7 +151,7 @@ def _changed_text(before: str, shown: ShownScene, asked: SaveScene) -> str:
 
 
 def _write(document: Any, shown: ShownScene, asked: SaveScene) -> None:
-    """Write what the view has of its own into the tables of the scene's file."""
+    """Write the values that the view changed into the tables of the scene's file."""
     scene, settings = shown.whole.scene, asked.settings
     if not _same_view(asked, scene.camera):
         _update(document, ("camera",), scene.camera, _seen_by(shown, asked))
@@ -180,7 +181,7 @@ def _update(document: Any, keys: Sequence[str | int], old: Fields, new: Fields) 
 
 
 def _same_view(asked: SaveScene, camera: Camera) -> bool:
-    """Whether a page's view is that of ``camera``, but for the rounding of its angles."""
+    """Whether a page's view is that of ``camera`` up to the rounding of its angles."""
     right, up, forward = camera.frame()
     *axes, eye = np.array(asked.m, np.float64).reshape(4, 4)[:, :3]
     size = max(1.0, float(np.abs([camera.eye, camera.target]).max()))
@@ -214,7 +215,7 @@ def _lines(fields: Fields) -> list[str]:
 
 
 def _given(fields: Fields) -> dict[str, Any]:
-    """The fields and their values, but for those without one, as TOML has it."""
+    """The fields and their values, without those that are None, which TOML does not have."""
     return {key: value for key, value in fields.model_dump(mode="json").items() if value is not None}
 
 

@@ -1,4 +1,4 @@
-"""A picture in view computed in two ways, and where they differ."""
+"""The picture of a view computed in two ways, and their differences."""
 
 import time
 from collections.abc import Callable
@@ -52,7 +52,7 @@ class Comparison:
 
     @property
     def identical(self) -> NDArray[np.bool_]:
-        """Whether a pixel's three values are the same to the bit, (h, w)."""
+        """Whether the three values of a pixel have the same bits, (h, w)."""
         first, second = (picture.view(np.uint32) for picture in self.pictures)
         return (first == second).all(axis=2)
 
@@ -84,7 +84,7 @@ class Comparison:
 
 
 def ways_of(view: CameraMessage) -> tuple[Way, Way]:
-    """The two ways that the view's settings ask for."""
+    """The two ways in the view's settings."""
     pair = view.settings.pair
     if pair == "samples":
         return Way(f"{FEW} samples", FEW), Way(f"{MANY} samples", MANY)
@@ -134,7 +134,7 @@ def _shares(size: tuple[int, int], finished: Callable[[float], object]) -> Calla
 
 
 def _for_others(shown: ShownScene, settings: ViewSettings) -> Scene:
-    """The scene with the settings that others can follow. Raises ``ValueError`` for those they cannot."""
+    """The scene with settings that other renderers have too. Raises ``ValueError`` for other settings."""
     for switch in ("reflection", "refraction"):
         expect(getattr(settings, switch), "comparison", f"{switch} as the materials have it", "it switched off")
     render = shown.scene.render.model_copy(update={"shadows": settings.shadows})

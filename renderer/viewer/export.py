@@ -32,7 +32,7 @@ _TURN, _SHORTEST = 4000, 20
 
 
 class StoppedError(Exception):
-    """Raised between the tiles of a file that is not wanted any more."""
+    """Raised between tiles when a file is cancelled."""
 
 
 def still(shown: ShownScene, asked: Still, finished: Callable[[float], object]) -> bytes:
@@ -96,18 +96,18 @@ class Exporter:
         self._busy = self._stopped = False
 
     def begin(self, shown: ShownScene, asked: Still | Turntable) -> None:
-        """Have a file made. Raises ``ValueError`` while another one is, and for what is no camera."""
+        """Start a file. Raises ``ValueError`` while another is under way, and for a bad camera."""
         expect(not self._busy, asked.type, "one file at a time", "another one while one is made")
         camera_of(asked.m, asked.fovy, height=asked.height)
         self._busy, self._stopped = True, False
         self._asked.put_nowait((shown, asked))
 
     def stop(self) -> None:
-        """Give the file under way up, if there is one: after the tiles under way, and between its pieces."""
+        """Cancel the file under way, if there is one: after the current tiles, and between pieces."""
         self._stopped = True
 
     async def run(self, complain: Callable[[Exception], Awaitable[None]]) -> None:
-        """Make files until cancelled; ``complain`` tells the page of a fault."""
+        """Make files until cancelled; ``complain`` sends errors to the page."""
         while True:
             shown, asked = await self._asked.get()
             try:
@@ -156,7 +156,7 @@ class Exporter:
 
 
 def _heard(ended: "asyncio.Future[Any]") -> None:
-    """Ask for the error of what was given up, so that none is reported as lost."""
+    """Retrieve the error of a cancelled task, so that asyncio does not report it."""
     if not ended.cancelled():
         ended.exception()
 

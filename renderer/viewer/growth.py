@@ -1,4 +1,4 @@
-"""The change that is left in the picture of a camera at rest."""
+"""The error that is left in the picture of a camera at rest."""
 
 from typing import Any
 

@@ -68,7 +68,7 @@ class Pass:
 
     @property
     def work(self) -> int:
-        """The camera rays that it takes."""
+        """The number of its camera rays."""
         first, end = self.band or (0, self.size[1])
         return self.size[0] * (end - first) * self.samples
 
@@ -98,7 +98,7 @@ def passes_of(view: CameraMessage, threads: int = 1) -> list[Pass]:
 
 
 def _full_size(view: CameraMessage) -> tuple[int, int]:
-    """The size of the last picture: that of the view, but for proofs, whose floats are kept."""
+    """The size of the last picture: that of the view, or less for a proof, whose floats are kept."""
     if view.mode != "proof":
         return view.w, view.h
     most, longest = min(1.0, (BAND_PIXELS / (view.w * view.h)) ** 0.5), max(view.w, view.h)
@@ -237,7 +237,7 @@ def _steps(
 def picture(
     shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Callable[[float], object] = lambda share: None
 ) -> Image:
-    """The same picture that ``render`` gives for the view's camera and settings, or the band of it that is wanted."""
+    """The picture that ``render`` gives for the view's camera and settings, or one band of it."""
     prepared = varied(shown.brute if view.mode == "brute" else shown.prepared, view.settings)
     full = wanted.last or wanted.band is not None
     settings = render_settings(shown.scene, view.settings, wanted.size, wanted.samples, full)

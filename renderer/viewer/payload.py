@@ -14,7 +14,7 @@ from renderer.mesh.mesh import face_normals
 from renderer.picture.prepare import PreparedScene
 from renderer.scene.hide import FLOOR, object_names
 from renderer.scene.light import DirectionalLight, Light
-from renderer.scene.material import Material
+from renderer.scene.material import Material, material_row
 from renderer.scene.needs import examine
 from renderer.shade.records import DIFFUSE, MATERIAL_COLUMNS, REFLECTANCE, SHININESS, SPECULAR, TRANSMITTANCE
 from renderer.shade.surface import SceneArrays
@@ -47,6 +47,7 @@ def description(shown: ShownScene) -> dict[str, Any]:
         "lights": [_light(light) for light in scene.lights],
         "ambient": scene.ambient,
         "background": scene.background,
+        "up": scene.up,
         "needs": {feature: [value, reason] for feature, value, reason in examine(scene)},
         "octree": {
             "levels": levels(shown.prepared.octree),
@@ -111,7 +112,7 @@ def _materials(arrays: SceneArrays, some: slice) -> NDArray[np.uint16]:
 
 
 def _material(name: str, material: Material) -> dict[str, Any]:
-    row = material.row().tolist()
+    row = material_row(material).tolist()
     colors = {"diffuse": DIFFUSE, "specular": SPECULAR, "reflectance": REFLECTANCE, "transmittance": TRANSMITTANCE}
     return {
         "name": name,

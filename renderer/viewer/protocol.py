@@ -75,7 +75,7 @@ class Edits(_Message):
 
     @property
     def any(self) -> bool:
-        """Whether there are any."""
+        """Whether there are changes."""
         return bool(self.materials) or self.lights is not None
 
 
@@ -127,7 +127,7 @@ class CameraMessage(_Sized):
 
 
 class Ack(_Message):
-    """The picture ``step`` of view ``seq`` is drawn: the next may come."""
+    """The page has drawn picture ``step`` of view ``seq`` and is ready for the next."""
 
     type: Literal["ack"]
     seq: _Sequence
@@ -175,7 +175,7 @@ class Hello(_Message):
 
 
 class OpenScene(_Message):
-    """Load one of the scene files offered, as it is now."""
+    """Load one of the offered scene files again."""
 
     type: Literal["scene"]
     file: _FileName
@@ -212,7 +212,7 @@ class SaveCamera(_Message):
 
 
 class AskCommand(_Sized):
-    """Say by which command line the picture of this view is rendered."""
+    """Send the command line that renders the picture of this view."""
 
     type: Literal["command"]
     mode: Mode

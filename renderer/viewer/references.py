@@ -57,7 +57,7 @@ def reference_picture(
 
 
 def _heard(other: "subprocess.Popen[bytes]", asked: bytes) -> Iterator[object]:
-    """The messages of the other process, once it is ``asked``, until it ends; 0.0 where none comes for a while."""
+    """The messages of the other process about the picture ``asked`` for; 0.0 while it is silent."""
     assert other.stdin is not None and other.stdout is not None
     heard: SimpleQueue[Any] = SimpleQueue()
     # It waits for the pipe on a thread, since only the other process ends such a wait.
@@ -73,7 +73,7 @@ def _heard(other: "subprocess.Popen[bytes]", asked: bytes) -> Iterator[object]:
 
 
 def _exchange(to: IO[bytes], of: IO[bytes], asked: bytes, heard: "SimpleQueue[Any]") -> None:
-    """Write what is ``asked``, and read answers until the other process ends, which is heard as None."""
+    """Send the request ``asked``, and read answers until the other process ends, which gives None."""
     # Its end of ``to`` tells the other process, by then, that this one has ended.
     with to, of:
         try:
@@ -86,7 +86,7 @@ def _exchange(to: IO[bytes], of: IO[bytes], asked: bytes, heard: "SimpleQueue[An
 
 
 def _checked(name: str, told: object, size: tuple[int, int]) -> NDArray[np.float32]:
-    """The picture that was told. Raises ``ValueError`` where it is a fault, or none of that size and finite."""
+    """The picture of an answer. Raises ``ValueError`` for an error, another size, or values that are not finite."""
     expect(isinstance(told, np.ndarray), "reference", f"a picture by {name}", told)
     assert isinstance(told, np.ndarray)  # which mypy cannot tell
     shape = (size[1], size[0], 3)
@@ -97,7 +97,7 @@ def _checked(name: str, told: object, size: tuple[int, int]) -> NDArray[np.float
 
 
 def answer() -> None:
-    """In the other process: compute the picture that is asked for, and tell shares of it, then all of it or a fault."""
+    """In the other process: compute the picture; send shares of progress, then the picture or an error."""
     told, sys.stdout = sys.stdout.buffer, sys.stderr  # to which a reference may print
     target, scene, size, max_depth = pickle.load(sys.stdin.buffer)
     Thread(target=_end_with, args=(sys.stdin.fileno(),), daemon=True).start()

@@ -46,7 +46,7 @@ T = TypeVar("T")
 
 
 class SupersededError(Exception):
-    """Raised between the tiles of a picture that is not wanted any more."""
+    """Raised between tiles when a newer view replaces the picture."""
 
 
 class Newest(Generic[T]):
@@ -81,7 +81,7 @@ class Newest(Generic[T]):
 
 
 class Reload:
-    """The wish to see what is shown by then as its files have it, which no page sends."""
+    """A request to load the shown scene again from its files; no page sends it."""
 
 
 class SceneHost(Protocol):
@@ -138,7 +138,7 @@ class Session:
         self._leaving: set[asyncio.Future[Any]] = set()
 
     async def receive(self, text: str) -> None:
-        """Take one message in, and tell the page of a fault in it."""
+        """Take one message; send the page an error if it is bad."""
         try:
             message = parse(text)
             if isinstance(message, CameraMessage):
@@ -259,7 +259,7 @@ class Session:
             left.set()
 
     async def _tell_progress(self, view: CameraMessage, done: float) -> None:
-        """Tell how much of a slow view is done, unless that was told a moment ago."""
+        """Send the progress of a slow view, at most ten times a second."""
         now = asyncio.get_running_loop().time()
         if view.mode in SLOW and now - self._told_at >= _PROGRESS:
             self._told_at = now

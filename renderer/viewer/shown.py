@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from secrets import token_hex
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from renderer.errors import expect
 from renderer.lazy import lazy
@@ -28,7 +28,7 @@ _CAMERA_BYTES = 16384
 
 
 class _Mark(NamedTuple):
-    """The mark by which a file that was edited since is told: nanoseconds of its last change, bytes, and its number."""
+    """The state of a file, by which edits show: the time of its last change in ns, its bytes, and its inode."""
 
     changed: int
     size: int
@@ -42,6 +42,7 @@ class ShownScene:
     path      the scene file, or None for a scene made in Python
     prepared  the scene over its octree, ready for any number of bounces
     marks     the files that it was loaded from, as they were then
+    up        the axis that was given for a mesh file, else None
     id        what tells it from every other scene, also from the same file loaded anew or by another server
     hidden    the objects that are left out, by name
     all       the scene with all objects where some are hidden, else None
@@ -55,6 +56,7 @@ class ShownScene:
     id: str = field(default_factory=lambda: token_hex(8))
     hidden: tuple[str, ...] = ()
     all: "ShownScene | None" = None
+    up: Literal["x", "y", "z"] | None = None
 
     @property
     def whole(self) -> "ShownScene":
@@ -155,19 +157,22 @@ def _lit(arrays: SceneArrays, scene: Scene, needs: Features) -> SceneArrays:
 
 
 def hiding(shown: ShownScene, hidden: Collection[str]) -> ShownScene:
-    """``shown`` without those of its objects, and with all others. Raises ``ValueError`` for names that it has not, and
-    where nothing would be left.
+    """``shown`` without the objects ``hidden``, and with all others. Raises ``ValueError`` for unknown names, and if
+    nothing is left.
     """
     whole = shown.whole
     names = tuple(name for name in object_names(whole.scene) if name in hidden)
     scene = without(whole.scene, hidden)
     if not names:
         return whole
-    return replace(prepare_shown(scene, whole.path), marks=whole.marks, hidden=names, all=whole)
+    return replace(prepare_shown(scene, whole.path), marks=whole.marks, hidden=names, all=whole, up=whole.up)
 
 
-def open_file(path: Path) -> ShownScene:
-    """Load a scene file and make it ready. Raises ``ValueError``, which ``SceneError`` is, naming file and fault."""
+def open_file(path: Path, up: Literal["x", "y", "z"] | None = None) -> ShownScene:
+    """Load a scene file, or a mesh file of which ``up`` points up, and make it ready.
+
+    Raises ``ValueError``, which ``SceneError`` is, naming file and fault.
+    """
     _expect_no_pipe(path)
     # Before they are read: those of a file that changes meanwhile differ from then on.
     marks = _marks([path])
@@ -175,12 +180,12 @@ def open_file(path: Path) -> ShownScene:
     for mesh in meshes:
         _expect_no_pipe(mesh)
     marks |= _marks(meshes)
-    scene = load_scene(path)
-    return replace(prepare_shown(scene, path), marks=marks)
+    scene = load_scene(path, up=up)
+    return replace(prepare_shown(scene, path), marks=marks, up=up)
 
 
 def _expect_no_pipe(path: Path) -> None:
-    """Raise ``ValueError`` for a pipe: one without a writer would be waited for."""
+    """Raise ``ValueError`` for a pipe: reading one without a writer waits for ever."""
     expect(not path.is_fifo(), str(path), "a file", "a pipe")
 
 

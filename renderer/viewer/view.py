@@ -1,8 +1,9 @@
 """``view``: a scene in, and the interactive viewer at work."""
 
+import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from renderer.errors import expect, extra_hint
 from renderer.scene.scene import Scene
@@ -12,24 +13,50 @@ if TYPE_CHECKING:
 
 
 def view(
-    scene: Scene | str | Path, *, host: str = "127.0.0.1", port: int = 0, browser: bool | None = None
+    scene: Scene | str | os.PathLike[str],
+    *,
+    up: Literal["x", "y", "z"] | None = None,
+    host: str = "127.0.0.1",
+    port: int = 0,
+    browser: bool | None = None,
 ) -> "ViewerServer":
-    """Show ``scene``, or a scene file, in the interactive viewer, and return at once.
+    """Show a scene in the interactive viewer, and return at once.
 
-    host     the address to listen on; one that other machines reach takes a token, which ``url`` then holds
-    port     0 takes a free one
-    browser  whether to open a browser; by default unless this is a notebook, which shows the result inline
+    Parameters
+    ----------
+    scene : Scene or path
+        The scene, or a scene file or mesh file as of ``load_scene``.
+    up : {"x", "y", "z"}, optional
+        The axis of a mesh file that points up, by default "y".
+    host : str, default "127.0.0.1"
+        The address to listen on. One that other machines reach needs a token, which ``url`` then has.
+    port : int, default 0
+        The port; 0 is any free one.
+    browser : bool, optional
+        Whether to open a browser. By default it opens, except in a notebook, which shows the viewer in its cell.
 
-    The result has ``url`` and ``close()``; the server ends with it or with the process. Raises ``ValueError`` naming
-    the argument, and ``ModuleNotFoundError`` where the extra ``viewer`` is not installed.
+    Returns
+    -------
+    ViewerServer
+        Its ``url`` is the address; ``close()`` ends the server, which also ends with the process.
 
+    Raises
+    ------
+    ValueError
+        For a bad argument, which the message names.
+    ModuleNotFoundError
+        Where the extra ``viewer`` is not installed.
+
+    Examples
+    --------
     >>> from renderer import view
     >>> viewing = view("scenes/stairs.toml", browser=False)
     >>> viewing.url.startswith("http://127.0.0.1:")
     True
     >>> viewing.close()
     """
-    expect(isinstance(scene, Scene | str | Path), "scene", "a Scene or a path", type(scene).__name__)
+    expect(isinstance(scene, Scene | str | os.PathLike), "scene", "a Scene or a path", type(scene).__name__)
+    expect(up is None or not isinstance(scene, Scene), "up", "None for a Scene, which has its own", repr(up))
     try:
         from renderer.viewer.server import ViewerServer
     except ModuleNotFoundError as error:
@@ -40,7 +67,7 @@ def view(
     from renderer.viewer.shown import open_file, prepare_shown
 
     compile_in_two()
-    shown = prepare_shown(scene) if isinstance(scene, Scene) else open_file(Path(scene))
+    shown = prepare_shown(scene) if isinstance(scene, Scene) else open_file(Path(scene), up)
     notebook = in_notebook()
     viewing = ViewerServer(shown, host, port, framed=notebook)
     if browser if browser is not None else not notebook:

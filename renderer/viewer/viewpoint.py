@@ -9,9 +9,11 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import ValidationError
 
-from renderer.errors import expect
+from renderer.errors import SceneError, expect
 from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
+from renderer.scene.fields import first_fault
 
 # From so many times the scene's size and distance away, rays to one point are parallel to a millionth.
 _FAR = 1e6
@@ -30,9 +32,13 @@ def camera_of(m: Sequence[float], fovy: float, distance: float = 1.0, height: fl
     with np.errstate(over="ignore", invalid="ignore"):  # the camera refuses what is not finite
         target = eye - distance * back
     at = {"eye": _vector(eye), "target": _vector(target), "up": _vector(up)}
-    if height is not None:
-        return OrthographicCamera(**at, height=float(height))
-    return PerspectiveCamera(**at, fov=math.degrees(fovy))
+    kind: type[Camera] = PerspectiveCamera if height is None else OrthographicCamera
+    film = {"fov": math.degrees(fovy)} if height is None else {"height": float(height)}
+    try:
+        # Not by the constructor, which warns of angles in radians: a page may zoom in so far.
+        return kind.model_validate({**at, **film})
+    except ValidationError as error:
+        raise SceneError(f"{kind.__name__}: {first_fault(error)}") from None
 
 
 def seen_from(camera: Camera, bounds: ArrayLike) -> tuple[float, float, float]:

@@ -172,7 +172,7 @@ def test_other_shapes_are_refused(name: str, argument: str, shape: str) -> None:
 
 @cases("name", [name for name, call in CALLS.items() if call.good is RAYS])
 @cases("bound", sorted(BOUNDS))
-@cases("shape", [(COUNT - 1,), (COUNT + 1,), (1,), (0,), (COUNT, 1), (1, COUNT), (COUNT, 3)])
+@cases("shape", [(COUNT - 1,), (COUNT + 1,), (0,), (COUNT, 3), (COUNT, 1, 2)])
 def test_bounds_of_other_shapes_are_refused(name: str, bound: str, shape: tuple[int, ...]) -> None:
     assert "shape" in refusal(name, bound, np.ones(shape))
 
@@ -490,7 +490,19 @@ BAD_SETTINGS: dict[str, list[Any]] = {
     "split": [None, "x", 0, "SAH", ["sah"], {"sah": 1}, np.array(["sah", "sah"])],
     "offset": [None, "x", np.nan, -1, np.inf, 0.1, 1j, [0.01], np.array([0.01]), True, 10**400],
     "threads": [0, -1, 1.5, "2", True, [1], np.array([1, 2]), np.nan],
-    "resolution": ["44", 4, (4,), (4, 4, 4), (0, 4), (4, -1), (4.5, 4), (np.nan, 4), (1 << 40, 4), (True, 4), [[4, 4]]],
+    "resolution": [
+        "44",
+        4.0,
+        (4,),
+        (4, 4, 4),
+        (0, 4),
+        (4, -1),
+        (4.5, 4),
+        (np.nan, 4),
+        (1 << 40, 4),
+        (True, 4),
+        [[4, 4]],
+    ],
     "samples": [0, -1, 2, 1.0, np.inf, "1", True, [1], 10**30],
     "max_depth": [-1, 65, 1.5, np.nan, True, "3", 10**40, [3]],
     "min_weight": [-1, 1, np.nan, np.inf, "0", 1j, [0.1], -1e-300],
@@ -553,7 +565,7 @@ CLASSES: list[tuple[type, dict[str, Any], dict[str, Any]]] = [
     (renderer.PointLight, {"position": (0, 3, 0)}, {"position": None, "intensity": -1.0}),
     (renderer.SceneObject, {"mesh": BOX, "material": "m"}, {"mesh": 3, "material": 3, "normals": "round", "scale": ()}),
     (renderer.Floor, {"min": (-1, -1), "max": (1, 1), "materials": ["m"]}, {"min": (1, 1), "squares": (0, 1)}),
-    (renderer.RenderSettings, {}, {"resolution": 512, "samples": 5, "max_depth": -1, "min_weight": 1.0}),
+    (renderer.RenderSettings, {}, {"resolution": 512.0, "samples": 5, "max_depth": -1, "min_weight": 1.0}),
     (Scene, {"camera": EYE, "materials": {}}, {"camera": 3, "lights": [{"type": "sun"}], "objects": [1]}),
 ]
 

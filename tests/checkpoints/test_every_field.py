@@ -13,25 +13,25 @@ from scenery import scenery
 
 from renderer import Mesh, Octree
 from renderer.checkpoints.parts import Parts
-from renderer.checkpoints.study import KINDS, Study, run
+from renderer.checkpoints.study import KINDS, Study, plan_of, run
 from renderer.cluster import run_on
 from renderer.cluster import studies as on_cluster
 from renderer.studies import tregenza
 from renderer.studies.points import Points, on_faces
 
-# What a run has of its own, and no option of a study.
-OF_POINTS = {"octree", "points", "normals", "leaving", "threads", "progress"}
+# What a run has of its own, and no option of a study; and a former name.
+OF_POINTS = {"octree", "points", "normals", "leaving", "threads", "progress"} | {"distance"}
 SUNS = {"sun_directions": np.array([[1.0, 0.2, 0.7], [-0.6, 0.5, 0.4]]), "weights": np.array([2.0, 3.5])}
 PATTERN = tregenza()._replace(weights=np.arange(145.0))
 USUAL: dict[str, dict[str, Any]] = {"sky": {}, "sun": SUNS, "ao": {}}
 # Another value for each option of each kind, or several in all forms that it may have.
 OTHERS: dict[str, dict[str, list[Any]]] = {
     "sky": {"patches": [100, np.int64(101), PATTERN, PATTERN._replace(weights=np.arange(145.0)[::-1])],
-            "up": [(0.3, 0.0, 1.0), [0.0, 0.3, 1.0], np.array([0.2, 0.3, 1.0])], "definition": ["geometric"],
-            "distance": [0.6]},
+            "up": ["x", (0.3, 0.0, 1.0), [0.0, 0.3, 1.0], np.array([0.2, 0.3, 1.0])], "definition": ["geometric"],
+            "max_distance": [0.6]},
     "sun": {"sun_directions": [SUNS["sun_directions"][::-1], [np.array([0.0, 0.3, 1.0]), np.array([0.4, 0.0, 1.0])]],
-            "weights": [np.array([3.5, 2.5])], "distance": [np.float32(0.6)]},
-    "ao": {"samples": [64], "distance": [0.6]},
+            "weights": [np.array([3.5, 2.5])], "max_distance": [np.float32(0.6)], "up": ["x", (-0.6, 0.5, 0.4)]},
+    "ao": {"samples": [64], "max_distance": [0.6]},
 }  # fmt: skip
 
 
@@ -56,7 +56,7 @@ class Asked:
 
     def plan(self) -> str:
         """What a folder is known by, as it is written there."""
-        return json.dumps(asdict(self.study.plan(self.mesh, self.points, self.points.order(), 8)))
+        return json.dumps(asdict(plan_of(self.study, self.mesh, self.points, self.points.order(), 8)))
 
 
 MESH = scenery()
@@ -110,7 +110,7 @@ def there(asked: Asked, folder: Path) -> Parts:
 
 @pytest.fixture(autouse=True)
 def few_points_a_part(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Study.plan, "__defaults__", (8,))
+    monkeypatch.setattr(plan_of, "__defaults__", (8,))
 
 
 @pytest.fixture

@@ -25,9 +25,12 @@ CAMERA = {"eye": [3.0, -4.0, 5.0], "target": [0.0, 0.0, 0.5], "up": [0.0, 0.0, 1
 FUNCTIONS: dict[str, tuple[str, list[str], dict[str, Any]]] = {
     "--patches": ("sky", ["--patches", "100"], {"patches": 100}),
     "--definition": ("sky", ["--definition", "geometric"], {"definition": "geometric"}),
-    "--distance": ("sky", ["--distance", "0.6"], {"distance": 0.6}),
-    "--distance of sun": ("sun", ["--suns", "{}/suns.txt", "--distance", "0.6"], {"distance": 0.6}),
-    "--distance of ao": ("ao", ["--distance", "0.6"], {"distance": 0.6}),
+    "--max-distance": ("sky", ["--max-distance", "0.6"], {"max_distance": 0.6}),
+    "--max-distance of sun": ("sun", ["--suns", "{}/suns.txt", "--max-distance", "0.6"], {"max_distance": 0.6}),
+    "--max-distance of ao": ("ao", ["--max-distance", "0.6"], {"max_distance": 0.6}),
+    "--distance": ("sky", ["--distance", "0.6"], {"max_distance": 0.6}),
+    "--up": ("sky", ["--up", "y"], {"up": "y"}),
+    "--up of sun": ("sun", ["--suns", "{}/suns.txt", "--up", "x"], {"up": "x"}),
     "--suns": ("sun", ["--suns", "{}/more.txt"], {"sun_directions": [[1, 0.2, 0.7], [0, 0.5, 0.4]], "weights": [2, 1]}),
     "--samples": ("ao", ["--samples", "64"], {"samples": 64}),
 }
@@ -42,8 +45,8 @@ BITLESS: dict[str, list[str]] = {
     "--threads": ["--threads", "1"],
     "--quiet": ["--quiet"],
 }
-# What changes the points: below, and in test_written_files.py.
-PLACES = {"--grid", "--points", "mesh"}
+# What changes the points: below, in test_written_files.py and in test_several_meshes.py.
+PLACES = {"--bounds", "--grid", "--height", "--hide", "--points", "mesh"}
 
 
 @pytest.fixture(scope="module")
@@ -111,6 +114,7 @@ def test_every_option_has_a_case() -> None:
 
 @pytest.mark.judges(
     "octree-render study", "octree-render study --definition", "octree-render study --distance",
+    "octree-render study --max-distance", "octree-render study --up",
     "octree-render study --faces", "octree-render study --patches", "octree-render study --samples",
     "octree-render study kind",
 )  # fmt: skip

@@ -31,7 +31,7 @@ def test_a_run_goes_on_where_it_was_killed_and_joins_the_parts_in_order(tmp_path
     _write(Parts(folder, PLAN), 0)
     again = Parts(folder, PLAN)
     assert again.missing() == [1]
-    with pytest.raises(OSError, match=r"00000001\.part: expected a part of the run, got none that is whole"):
+    with pytest.raises(OSError, match=r"00000001\.part: expected a whole part of the run, got none"):
         again.join(result)
     assert not result.exists()
     _write(again, 1)
@@ -123,6 +123,6 @@ def test_rows_go_where_an_order_says(tmp_path: Path, monkeypatch: pytest.MonkeyP
     parts.join(tmp_path / "r.npy")
     assert np.load(tmp_path / "r.npy").tobytes() == values.tobytes()
     (tmp_path / "parts" / "00000002.part").unlink()
-    with pytest.raises(OSError, match=r"00000002\.part: expected a part of the run"):
+    with pytest.raises(OSError, match=r"00000002\.part: expected a whole part of the run"):
         parts.join(tmp_path / "none.npy")
     assert not (tmp_path / "none.npy").exists()

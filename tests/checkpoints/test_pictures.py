@@ -73,7 +73,7 @@ def test_bands_of_rows_make_the_picture_of_all(
 def test_a_picture_that_lacks_a_part_is_none(ready: PreparedScene, tmp_path: Path) -> None:
     run = PictureRun(tmp_path / "parts", picture_of(ready.scene), 20)
     run.parts.write(0, run.picture.rows(ready, 0, 20, threads=2))
-    with pytest.raises(OSError, match=r"00000001\.part: expected a part of the run, got none"):
+    with pytest.raises(OSError, match=r"00000001\.part: expected a whole part of the run, got none"):
         run.image()
 
 

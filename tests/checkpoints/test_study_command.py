@@ -52,21 +52,27 @@ def _run(*arguments: object) -> int:
     "arguments, said",
     [
         (["sky", "-o", "a.txt"], "--output: expected one of .npy, .ply, .png"),
-        (["sky", "--grid", "1", "-o", "a.png"], "--output: expected .npy or .ply for points"),
+        (["sky", "--grid", "1", "-o", "a.png"], "--output: expected .npy or .ply, as a picture"),
         (["sky", "--grid", "0", "-o", "a.npy"], "--grid: expected a number > 0"),
         (["sky", "--grid", "nan", "-o", "a.npy"], "--grid: expected a number > 0"),
         (["sky", "--grid", "1e-9", "-o", "a.npy"], "--grid: expected a spacing with at most"),
         (["sun", "-o", "a.npy"], "--suns: expected a file for the kind sun"),
-        (["sky", "--suns", "none.txt", "-o", "a.npy"], "--suns: expected none, as it is the kind sun's"),
-        (["ao", "--patches", "577", "-o", "a.npy"], "--patches: expected none, as it is the kind sky's"),
-        (["ao", "--definition", "cosine", "-o", "a.npy"], "--definition: expected none, as it is the kind sky's"),
-        (["sky", "--samples", "9", "-o", "a.npy"], "--samples: expected none, as it is the kind ao's"),
+        (["sky", "--suns", "none.txt", "-o", "a.npy"], "--suns: expected none but for the kind sun"),
+        (["ao", "--patches", "577", "-o", "a.npy"], "--patches: expected none but for the kind sky"),
+        (["ao", "--definition", "cosine", "-o", "a.npy"], "--definition: expected none but for the kind sky"),
+        (["sky", "--samples", "9", "-o", "a.npy"], "--samples: expected none but for the kind ao"),
         (["sky", "--patches", "0", "-o", "a.npy"], "patches: expected"),
-        (["sky", "--distance", "-1", "-o", "a.npy"], "distance: expected"),
+        (["sky", "--max-distance", "-1", "-o", "a.npy"], "max_distance: expected"),
         (["sky", "--points", "none.npy", "-o", "a.npy"], "none.npy"),
-        (["sky", "--camera", "s.toml", "-o", "a.npy"], "--camera: expected a .png"),
+        (["sky", "--camera", "s.toml", "-o", "a.npy"], "--camera: expected an output that ends in .png"),
         (["sun", "--suns", "suns.txt", "-o", "a.npy"], "weights: expected"),
         (["sky", "-o", "none/a.npy"], "none/a.npy"),
+        (["sky", "--height", "1", "-o", "a.npy"], "--height: expected none without --grid"),
+        (["sky", "--bounds", *"000111", "-o", "a.npy"], "--bounds: expected none without --grid"),
+        (["sky", "--grid", "1", "--height", "nan", "-o", "a.npy"], "--height: expected a finite number, got nan"),
+        (["sky", "--grid", "1", "--bounds", *"010101", "-o", "a.npy"], "--bounds: expected the least corner, then"),
+        (["sky", "--hide", "tree*", "-o", "a.npy"], "--hide: expected the name of a mesh file, or a pattern of names"),
+        (["sky", "--hide", "c?ty.ply", "-o", "a.npy"], "--hide: expected one file at least that is left, got none"),
     ],
 )
 def test_bad_arguments_are_told_on_one_line(
@@ -113,7 +119,7 @@ def test_a_run_that_is_killed_goes_on_and_ends_with_the_same_bits(tmp_path: Path
     program = (
         "import sys, time\n"
         "from renderer.checkpoints import parts, study\n"
-        "study.Study.plan.__defaults__, own, most = (64,), parts.Parts.write, int(sys.argv[1])\n"
+        "study.plan_of.__defaults__, own, most = (64,), parts.Parts.write, int(sys.argv[1])\n"
         "def write(self, *part):\n"
         "    own(self, *part)\n"
         "    while len(list(self.folder.glob('*.part'))) >= most: time.sleep(0.1)\n"
@@ -152,8 +158,8 @@ def test_several_outputs_are_of_one_study(city: Path, tmp_path: Path, monkeypatc
     for name, element in (("a", "face"), ("b", "vertex")):
         values = PlyData.read(tmp_path / f"{name}.ply")[element]["value"]
         np.testing.assert_array_equal(np.load(tmp_path / f"{name}.npy"), values)
-    with Pillow.open(tmp_path / "a.PNG") as picture:  # as large as unless told, and a legend
-        assert picture.width == 960 and 720 < picture.height < 800
+    with Pillow.open(tmp_path / "a.PNG") as picture:
+        assert picture.size == (960, 720)
 
 
 @pytest.mark.parametrize("told, threads", [((), available_threads()), (("--threads", 1), 1)])
@@ -233,12 +239,13 @@ def test_options_that_are_refused_leave_no_parts(city: Path, tmp_path: Path, wro
     assert main(command) == 0
 
 
-@pytest.mark.parametrize("size", ["1x1", "8192x1"])
-def test_the_smallest_picture_and_the_widest(city: Path, tmp_path: Path, size: str) -> None:
+@pytest.mark.parametrize("size", ["1x1", "8192x1", "9x55", "9x56", "321x123"])
+def test_a_picture_has_the_size_that_was_asked_for(city: Path, tmp_path: Path, size: str) -> None:
+    """The legend came on top: 321x123 gave 321 x 151."""
     output = tmp_path / "a.png"
     assert main(["study", "sky", str(city), "-o", str(output), "--resolution", size, "--quiet"]) == 0
-    with Pillow.open(output) as picture:  # below it stands a legend
-        assert picture.width == int(size.partition("x")[0])
+    with Pillow.open(output) as picture:
+        assert "{}x{}".format(*picture.size) == size
 
 
 @cases(
@@ -270,7 +277,7 @@ def test_no_output_is_a_file_that_is_read(tmp_path: Path, capsys: pytest.Capture
         del options[:2]
     command = ["study", "sun", str(given["mesh"]), *options, "-o", str(tmp_path / "link.png")]
     assert main(command) == 2
-    assert "--output: expected another file than those that are read" in capsys.readouterr().err
+    assert "--output: expected a file that is not an input" in capsys.readouterr().err
     assert [file.read_text() for file in given.values()] == ["whole"] * 4
 
 

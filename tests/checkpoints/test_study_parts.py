@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from renderer import Octree
-from renderer.checkpoints.study import Study, parts_of, run
+from renderer.checkpoints.study import Study, parts_of, plan_of, run
 from renderer.studies.points import Points, on_faces
 from validation.benchmark.measures.meshes import named
 
@@ -31,7 +31,7 @@ def points(octree: Octree) -> Points:
 def test_points_of_a_part_lie_together_and_answers_stay_in_the_callers_order(
     octree: Octree, points: Points, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(Study.plan, "__defaults__", (64,))
+    monkeypatch.setattr(plan_of, "__defaults__", (64,))
     parts = run(octree, STUDY, points, tmp_path / "parts")
     assert parts.joined().tobytes() == STUDY.evaluate(octree, points).tobytes()
     rows = [parts.rows(part) for part in range(parts.plan.parts)]

@@ -45,7 +45,7 @@ def test_a_grid_goes_row_by_row_along_x_and_lies_on_what_is_first_from_above(spa
     lower, upper = MESH.bounds
     x, y = (np.arange(low + spacing / 2, high + 1e-9, spacing) for low, high in zip(lower[:2], upper[:2], strict=True))
     if spacing == 100.0:
-        with pytest.raises(ValueError, match="--grid: expected points above the mesh"):
+        with pytest.raises(ValueError, match="spacing: expected points above the mesh"):
             on_grid(Octree.from_mesh(MESH), spacing)
         return
     above = np.array([[a, b, 99.0] for b in y for a in x])

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from renderer import Mesh, PerspectiveCamera
+from renderer.arguments.up import turn_to
 from renderer.mesh.shapes import box
 from renderer.scene.overview import from_above
 
@@ -41,6 +42,15 @@ def test_all_vertices_are_in_the_picture_and_reach_two_of_its_sides(
     ends = np.stack([found.min(axis=0), found.max(axis=0)])
     full = np.abs(np.abs(ends) - edge).max(axis=0)
     assert full.min() < 1e-6 or np.abs(ends.sum(axis=0)).min() < 1e-6
+
+
+@pytest.mark.parametrize(("up", "axis"), [("x", 0), ("y", 1), ("z", 2)])
+def test_a_mesh_that_is_turned_to_another_axis_is_seen_from_the_same_side(up: str, axis: int) -> None:
+    mesh, size, turn = box((0, 0, 0), (3, 2, 1)), (40, 30), turn_to(up) @ turn_to("z").T
+    turned = Mesh(mesh.vertices @ turn.T, mesh.faces)
+    found = places(from_above(turned, size, up), turned.vertices, size)
+    np.testing.assert_allclose(found, places(from_above(mesh, size), mesh.vertices, size), rtol=0, atol=1e-12)
+    assert from_above(turned, size, up).up == tuple(np.eye(3)[axis])
 
 
 def test_one_point_is_in_the_middle() -> None:

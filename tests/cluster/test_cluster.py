@@ -11,13 +11,17 @@ import pytest
 from cases import cases
 
 from renderer import Mesh, Octree
-from renderer.checkpoints.study import Study, run
-from renderer.cluster import any_hit, closest_hit, connected, run_on
+from renderer.checkpoints.study import run
+from renderer.cluster import Study, any_hit, closest_hit, connected, run_on
+from renderer.studies import face_points
 from renderer.studies.points import on_faces
 from renderer.system.threads import checked_threads
 from validation.benchmark.measures.meshes import named
 
-pytestmark = pytest.mark.judges("cluster.any_hit", "cluster.closest_hit", "cluster.connected", "cluster.run_on")
+pytestmark = pytest.mark.judges(
+    "cluster.Study", "cluster.Study.evaluate", "cluster.any_hit", "cluster.closest_hit", "cluster.connected",
+    "cluster.run_on",
+)  # fmt: skip
 
 
 SIZE = 64
@@ -35,7 +39,9 @@ def test_a_study_on_workers_has_the_bits_of_one_process(client: Any, octree: Oct
     assert here.tobytes() == expected.tobytes()
     there = run_on(client, octree, study, points, str(tmp_path / "there"), size=SIZE)
     assert there.plan.parts > 10 and there.joined().tobytes() == expected.tobytes()
-    other = run_on(client, octree, study, points, tmp_path / "other", size=SIZE * 4, split="sah")
+    places = face_points(octree.mesh)
+    assert study.evaluate(octree, places).tobytes() == expected.tobytes()
+    other = run_on(client, octree, study, places, tmp_path / "other", size=SIZE * 4, split="sah")
     assert 1 < other.plan.parts < there.plan.parts and other.joined().tobytes() == expected.tobytes()
 
 
@@ -118,7 +124,7 @@ def test_without_the_extra_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPa
         ({"size": 0}, "size: expected an int"),
         ({"split": "x"}, "split: expected one of"),
         ({"study": "sky"}, "study: expected a Study, got str"),
-        ({"points": np.zeros((1, 3))}, "points: expected Points, got ndarray"),
+        ({"points": np.zeros((1, 3))}, "points: expected FacePoints, got ndarray"),
         ({"folder": 3}, "folder: expected a string"),
         ({"octree": 1}, "octree: expected an Octree"),
     ],

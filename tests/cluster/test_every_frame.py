@@ -70,7 +70,7 @@ def plan_of(scene: Scene, camera: Any = None, **options: Any) -> str:
 def frame_of(scene: Scene, varied: Scene, other: Variation) -> Scene:
     """The scene with the field, over the same meshes unless it is one of theirs."""
     top = str(other.keys[0])
-    return varied if top in ("objects", "floor") else scene.altered(**{top: getattr(varied, top)})
+    return varied if top in ("objects", "floor", "up") else scene.altered(**{top: getattr(varied, top)})
 
 
 @pytest.mark.parametrize("other", VARIATIONS, ids=str)

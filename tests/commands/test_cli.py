@@ -154,7 +154,7 @@ def test_info_of_an_empty_scene(tmp_path: Path, capsys: pytest.CaptureFixture[st
         ["render", STAIRS, "--threads", "1.0"],
         ["render", STAIRS, "--split", "kd"],
         ["view", STAIRS, "--port", "0.5"],
-        ["render", STAIRS, "--resolution", "512"],
+        ["render", STAIRS, "--resolution", "512x"],
         ["render", STAIRS, "--resolution", "axb"],
         ["render", STAIRS, "--resolution", "-1x5"],
         ["render", STAIRS, "--samples", "x"],
@@ -173,6 +173,10 @@ def test_info_of_an_empty_scene(tmp_path: Path, capsys: pytest.CaptureFixture[st
         ["study", "sky", "m.ply", "-o", "a.npy", "--definition", "x"],
         ["study", "ao", "m.ply", "-o", "a.npy", "--samples", "x"],
         ["study", "sky", "m.ply", "-o", "a.npy", "--distance", "x"],
+        ["study", "sky", "m.ply", "-o", "a.npy", "--max-distance", "x"],
+        ["study", "sky", "m.ply", "-o", "a.npy", "--up", "w"],
+        ["study", "sky", "m.ply", "-o", "a.npy", "--grid", "1", "--height", "x"],
+        ["study", "sky", "m.ply", "-o", "a.npy", "--grid", "1", "--bounds", "0", "0", "0", "1", "1"],
         ["study", "sky", "m.ply", "-o", "a.npy", "--threads", "x"],
         ["compile", "--level", "x86-64-v9", "-o", "x"],
         ["compile", "--queries", "--pictures"],
@@ -278,7 +282,7 @@ def test_compile_fails_where_nothing_can_be_kept(tmp_path: Path) -> None:
         env={**os.environ, "NUMBA_CACHE_DIR": nowhere}, cwd=ROOT,
     )  # fmt: skip
     assert done.returncode == 2
-    assert re.search(r"octree-render: \d+ kernels were compiled but could not be kept", done.stderr)
+    assert re.search(r"octree-render: \d+ kernels were compiled but could not be saved", done.stderr)
 
 
 def test_kernels_for_a_level_need_a_folder(capsys: pytest.CaptureFixture[str]) -> None:

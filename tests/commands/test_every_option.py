@@ -42,11 +42,11 @@ BITLESS = {"--accelerator", "--split", "--threads"}
 HERE = {
     "render": {*PICTURES, "scene", "--output", "--write-scene", "--quiet", "--cluster"},
     "info": {"scene", "--split"},
-    "view": {"scene", "--write-scene", "--host", "--port", "--no-browser"},
+    "view": {"scene", "--up", "--write-scene", "--host", "--port", "--no-browser"},
     "compile": {"--queries", "--pictures", "--all", "--level", "--output", "--quiet"},
 }
-# tests/scene/test_every_change.py
-ELSEWHERE = {"render": {"--change"}}
+# tests/scene/test_every_change.py, tests/scene/test_up.py
+ELSEWHERE = {"render": {"--change", "--up"}}
 
 
 def commands() -> dict[str, argparse.ArgumentParser]:
@@ -159,7 +159,7 @@ def test_what_is_said_of_cut_pixels_names_the_rays_that_held(
 ) -> None:  # fmt: skip
     rendered(folder / "scene.toml", tmp_path / "a.npy", *words, *where)
     cut = picture(load_scene(folder / "scene.toml"), max_rays=most).cut
-    said = f"octree-render: {cut} of 80 pixels miss rays: they took max_rays = {most} a sample."
+    said = f"octree-render: {cut} of 80 pixels miss rays: a sample reached max_rays = {most}."
     assert capsys.readouterr().err.startswith(said)
 
 
@@ -239,14 +239,20 @@ def test_what_is_said_of_a_scene_is_of_its_own_tree(
 
 
 @pytest.mark.parametrize(
-    ("words", "given"), [([], {}), (["--host", "0.0.0.0"], {"host": "0.0.0.0"}), (["--port", "8123"], {"port": 8123})]
+    ("words", "given"),
+    [
+        ([], {}),
+        (["--host", "0.0.0.0"], {"host": "0.0.0.0"}),
+        (["--port", "8123"], {"port": 8123}),
+        (["--up", "z"], {"up": "z"}),
+    ],
 )
 @pytest.mark.parametrize("browser", [True, False])
 def test_a_viewer_is_shown_where_it_is_told(
     folder: Path, viewed: list[Any], words: list[str], given: dict[str, Any], browser: bool
 ) -> None:
     assert main(["view", str(folder / "scene.toml"), *words, *([] if browser else ["--no-browser"])]) == 0
-    usual = {"host": "127.0.0.1", "port": 0, "browser": False}
+    usual = {"up": None, "host": "127.0.0.1", "port": 0, "browser": False}
     assert viewed == [(folder / "scene.toml", usual | given), *(["browser"] if browser else []), "wait"]
 
 

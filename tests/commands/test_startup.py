@@ -96,7 +96,7 @@ def test_the_public_names_are_there_whatever_was_imported_first():
     )
     tell = """\
 public = {name: getattr(renderer, name) for name in renderer.__all__ if name != "__version__"}
-print(callable(render), *[f"{name}:{found.__module__}" for name, found in public.items()])"""
+print(callable(render), *[f"{name}:{getattr(found, '__module__', None)}" for name, found in public.items()])"""
     is_callable, *names = output(f"{script}\n{tell}").split()
     assert is_callable == "True" and "render:renderer.picture.render" in names and "Mesh:renderer.mesh.mesh" in names
 

@@ -134,7 +134,7 @@ def test_max_distance_is_closed_and_finds_nothing_beyond():
         ({"points": [[0, 0, 0], [0, np.nan, 0]]}, r"points: expected finite .*, got \[0\.0, nan, 0\.0\] in row 1"),
         ({"points": [[0, 0, 1e39]]}, r"points: expected finite numbers within 8\.51e\+37, got .* in row 0"),
         ({"points": [[0, 0, 0]], "max_distance": -1.0}, r"max_distance: expected numbers from 0, got -1\.0 in row 0"),
-        ({"points": [[0, 0, 0]], "max_distance": [1.0, 2.0]}, r"max_distance: expected a number or shape \(1,\)"),
+        ({"points": [[0, 0, 0]] * 3, "max_distance": [1.0, 2.0]}, "max_distance: expected a number or a shape"),
         ({"points": [[0, 0, 0]], "max_distance": np.nan}, "max_distance: expected numbers from 0, got nan in row 0"),
     ],
 )

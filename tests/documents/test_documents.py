@@ -1,6 +1,7 @@
 """What README and docs say to type works as it stands, and what they name is there."""
 
 import ast
+import doctest
 import inspect
 import os
 import re
@@ -34,6 +35,8 @@ README = ROOT / "README.md"
 DOCS = sorted((ROOT / "docs").rglob("*.md"))
 PAGES = [README, *DOCS, ROOT / "reports" / "README.md", *sorted(ROOT.glob("[CS]*.md"))]
 PYTHON = re.compile(r"```python\n(.*?)```", re.DOTALL)
+SESSION = re.compile(r"```pycon\n(.*?)```", re.DOTALL)
+CODE = re.compile(r"```py(?:thon|con)\n(.*?)```", re.DOTALL)
 FENCED = re.compile(r"```(toml|yaml)\n(.*?)```", re.DOTALL)
 # A line of a block to type, without its comment, and commands within a sentence or a table.
 TYPED = re.compile(r"^    (\S.*?)(?:\s+#.*)?$", re.MULTILINE)
@@ -45,7 +48,13 @@ NAMED = re.compile(
 )
 HEADING = re.compile(r"^#+ (.*)$", re.MULTILINE)
 # What commands write, and so may be absent.
-WRITTEN = {"reports/index.html", "reports/benchmark.html", "renderer/__pycache__", "renderer/compiled"}
+WRITTEN = {
+    "reports/index.html",
+    "reports/metrics.json",
+    "reports/benchmark.html",
+    "renderer/__pycache__",
+    "renderer/compiled",
+}
 PARSERS = {
     "octree-render": make_parser,
     "octree-validate": validation_parser,
@@ -100,6 +109,8 @@ NOT_RUN = {
     "python -m validation [": "a line of usage",
     "python -m validation --defects [": "a line of usage",
     "python -m validation --write-baseline [": "a line of usage",
+    "python -m validation --record FILE": "a line of usage",
+    "python -m validation --compare FILE": "a line of usage",
 }
 NOT_HERE = (*RUN_ELSEWHERE, *NOT_RUN)
 # Files of a user that commands of pages name.
@@ -116,7 +127,7 @@ def snippets():
 
 def typed(page):
     """The commands of a page's blocks, without folders of executables and variables of the environment before them."""
-    text = PYTHON.sub("", page.read_text(encoding="utf-8"))
+    text = CODE.sub("", page.read_text(encoding="utf-8"))
     lines = [re.sub(r"^(?:[A-Z_]+=\S+ )+", "", line) for line in TYPED.findall(text)]
     return [re.sub(r"^\.venv/bin/", "", part.strip()) for line in lines for part in line.split("&&")]
 
@@ -144,10 +155,21 @@ def test_python_in_a_page_runs_as_it_stands(page, block, tmp_path, monkeypatch):
         if find_spec(package) is None:
             assert unknown_names(block) == []
             pytest.skip(f"compiled and its names of ours found, but not run: {package} is not installed")
-    names: dict[str, object] = {}
+    names: dict[str, object] = {"__name__": "__main__"}
     exec(code, names)
-    if page == README and "closest_hit" in block:
-        assert names["shadowed"].tolist() == [True, False] and (tmp_path / "glass.png").stat().st_size > 10_000
+
+
+@pytest.mark.judges("Hits.hit")
+@pytest.mark.parametrize("page", [page for page in PAGES if "```pycon" in page.read_text(encoding="utf-8")], ids=shown)
+def test_a_session_in_a_page_prints_what_stands_there(page, tmp_path, monkeypatch):
+    """All sessions of a page in one interpreter, one after the other."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scenes").symlink_to(ROOT / "scenes")
+    text = "\n".join(SESSION.findall(page.read_text(encoding="utf-8")))
+    examples = doctest.DocTestParser().get_examples(text)
+    runner = doctest.DocTestRunner(verbose=False)
+    runner.run(doctest.DocTest(examples, {}, page.name, str(page), 0, text))
+    assert runner.tries == text.count(">>> ") > 0 and runner.failures == 0
 
 
 def unknown_names(block):
@@ -318,8 +340,8 @@ def test_every_block_is_of_a_kind_that_is_run(page):
     """Python is run above, TOML and YAML are read; what Sphinx and BibTeX read is neither's; nothing hides as text."""
     kinds = re.findall(r"^```(.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
     kinds = {kind.split()[0] for kind in kinds}
-    of_sphinx = {"index.md": {"{include}", "{raw}", "{toctree}"}, "downloads.md": {"{raw}"}}.get(page.name, set())
-    assert kinds <= {"python", "toml", "yaml", "bibtex", *of_sphinx}
+    of_sphinx = {"index.md": {"{include}", "{toctree}"}, "downloads.md": {"{raw}"}}.get(page.name, set())
+    assert kinds <= {"python", "pycon", "toml", "yaml", "bibtex", *of_sphinx}
 
 
 @cases(("page", "line"), commands("octree-", "python -m validation"))
@@ -412,7 +434,7 @@ def anchors(page):
 
 
 def links(page):
-    return [link for link in LINK.findall(PYTHON.sub("", page.read_text(encoding="utf-8"))) if "://" not in link]
+    return [link for link in LINK.findall(CODE.sub("", page.read_text(encoding="utf-8"))) if "://" not in link]
 
 
 @cases(("page", "link"), [(p, link) for p in PAGES for link in links(p)])

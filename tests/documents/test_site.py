@@ -1,4 +1,4 @@
-"""The site's parts: gallery and notebooks run, docstrings become lists, links are checked, names have a place."""
+"""The site's parts: gallery and notebooks run, links are checked, names have a place."""
 
 import gzip
 import hashlib
@@ -259,56 +259,10 @@ def test_links_of_notebooks_lead_somewhere():
             assert (notebook.parent / link).is_file(), link
 
 
-def test_tiles_have_the_readmes_figures():
-    assert "<p><b>" in module("figures")["tiles"]((ROOT / "README.md").read_text(encoding="utf-8"))
-    made = module("figures")["tiles"]("| a < b | 7 | c | `make x` |\n| d | 8 | | `make y` |\n| no figure | 9 | |")
-    assert made.splitlines()[1:3] == [
-        "<p><b>7</b> a &lt; b<small>c</small><small><code>make x</code></small></p>",
-        "<p><b>8</b> d<small><code>make y</code></small></p>",
-    ]
-    assert len(made.splitlines()) == 4
-
-
 def test_samples_are_pages():
     for name, title in (("report", "Octree ray tracer: validation"), ("benchmark", "Octree ray tracer: benchmark")):
         text = gzip.decompress((ROOT / "docs" / "samples" / f"{name}.html.gz").read_bytes()).decode()
         assert f"<h1>{title}</h1>" in text and not re.search(r'(?:src|href)="(?!data:|#)', text)
-
-
-DOCSTRING = """The first line, with ``x_`` and |d|.
-
-a, b  (n, 3), two of them,
-      and more
-t : a bound
-
-Then text.
-
->>> a  | b
-1  2
-""".splitlines()
-RST = [
-    "The first line, with ``x_`` and \\|d\\|.",
-    "",
-    "",
-    "a, b",
-    "    (n, 3), two of them,",
-    "    and more",
-    "",
-    "t",
-    "    a bound",
-    "",
-    "",
-    "Then text.",
-    "",
-    ">>> a  | b",
-    "1  2",
-]
-
-
-def test_tables_of_docstrings_become_lists_of_definitions():
-    lines = list(DOCSTRING)
-    module("docstrings")["as_rst"](lines)
-    assert lines == RST
 
 
 def test_links_that_lead_nowhere_are_found(tmp_path, capsys):

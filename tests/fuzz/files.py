@@ -18,7 +18,7 @@ import plyfile
 import trimesh
 
 from fuzz.values import SECONDS, Kind, time_limit
-from renderer import BruteForce, Mesh, MeshError, Octree, Scene, SceneError, load_mesh, load_scene
+from renderer import BruteForce, Mesh, MeshError, Octree, Scene, SceneError, SceneWarning, load_mesh, load_scene
 from renderer.mesh.mesh import RepairWarning
 from renderer.mesh.ply import format_ply
 from renderer.mesh.shapes import box, torus
@@ -304,6 +304,7 @@ def check(path: Path, content: bytes, index: int) -> str:
     rng = np.random.default_rng(index)
     with warnings.catch_warnings(), time_limit(SECONDS):
         warnings.simplefilter("error")
+        warnings.simplefilter("ignore", SceneWarning)
         try:
             loaded: Mesh | Scene = load_scene(path) if path.suffix == ".toml" else load_mesh(path)
         except (MeshError, SceneError) as error:

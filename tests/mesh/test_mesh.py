@@ -10,6 +10,7 @@ from cases import cases
 from hypothesis import given
 from hypothesis import strategies as st
 
+from renderer import Octree
 from renderer.errors import MeshError
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, grid, icosphere, torus
@@ -88,10 +89,10 @@ def test_a_mesh_that_views_arrays_has_them_and_checks_their_values() -> None:
         "vertices": np.eye(3), "faces": np.array([[0, 1, 2]], np.int32), "normals": np.full((3, 3), 2.0),
         "colors": np.full((3, 3), 0.5, np.float32), "texcoords": np.zeros((3, 2)),
     }  # fmt: skip
-    mesh = Mesh.viewing(arrays, "seen")
+    mesh = Mesh._viewing(arrays, "seen")
     assert all(np.shares_memory(getattr(mesh, name), array) for name, array in arrays.items()) and mesh.name == "seen"
     assert not mesh.colors.flags.writeable  # type: ignore[union-attr]
-    bare = Mesh.viewing({name: arrays[name] for name in ("vertices", "faces")}, "")
+    bare = Mesh._viewing({name: arrays[name] for name in ("vertices", "faces")}, "")
     assert bare.normals is bare.colors is bare.texcoords is None
     for name, value in (
         ("vertices", np.nan),
@@ -101,7 +102,7 @@ def test_a_mesh_that_views_arrays_has_them_and_checks_their_values() -> None:
         ("texcoords", np.nan),
     ):
         with pytest.raises(MeshError, match=f"^seen: {name}: expected"):
-            Mesh.viewing(arrays | {name: np.full_like(arrays[name], value)}, "seen")
+            Mesh._viewing(arrays | {name: np.full_like(arrays[name], value)}, "seen")
 
 
 def test_may_be_empty() -> None:
@@ -168,9 +169,21 @@ def test_closed() -> None:
     turned = cube.faces.copy()
     turned[0] = turned[0, ::-1]
     assert not Mesh(cube.vertices, turned).is_closed()
-    assert not Mesh(cube.vertices, np.concatenate([cube.faces, cube.faces])).is_closed()
-    assert not Mesh(cube.vertices, np.concatenate([cube.faces, [[0, 0, 0]]])).is_closed()
-    assert not grid().is_closed()
+    assert not grid().is_closed() and not Mesh([], []).is_closed()
+
+
+@pytest.mark.judges("Mesh.is_closed")
+def test_what_is_closed_is_what_contains_takes() -> None:
+    """By position: triangle soup, a body that is there twice, and one with a face without area."""
+    cube = box()
+    soup = Mesh(cube.triangles.reshape(-1, 3), np.arange(36).reshape(-1, 3))
+    twice = Mesh(cube.vertices, np.concatenate([cube.faces, cube.faces]))
+    flat = Mesh(cube.vertices, np.concatenate([cube.faces, [[0, 0, 0]]]))
+    for mesh in (soup, twice, flat):
+        assert mesh.is_closed()
+        assert Octree(mesh).contains([0.5, 0.25, 0.5])
+    with pytest.raises(ValueError, match=r"^mesh: expected a closed mesh"):
+        Octree(Mesh(soup.vertices, soup.faces[1:])).contains([0.5, 0.25, 0.5])
 
 
 @given(st.integers(0, 10**6), st.booleans())

@@ -4,11 +4,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 import trimesh
 from cases import cases
 
 from renderer import Mesh, load_mesh
+from renderer.mesh.colormaps import COLORMAPS
 from renderer.mesh.load import save_ply
+from renderer.mesh.shapes import box
 
 NAMES = {"normals": ("nx", "ny", "nz"), "colors": ("red", "green", "blue"), "texcoords": ("s", "t")}
 
@@ -44,3 +47,77 @@ def test_a_file_has_what_the_mesh_has_and_nothing_else(
     again = load_mesh(tmp_path / "a.ply")
     for each in ("vertices", "faces", *NAMES):
         np.testing.assert_array_equal(getattr(again, each), getattr(mesh, each))
+
+
+CUBE = box((0.0, 0.0, 0.0), (1.0, 2.0, 3.0))
+
+
+@pytest.mark.judges("Mesh.save")
+def test_a_mesh_is_saved_as_it_is(tmp_path: Path) -> None:
+    mesh = mesh_with(tuple(NAMES), exact=False)
+    mesh.save(tmp_path / "a.PLY")
+    save_ply(mesh, tmp_path / "b.ply")
+    assert (tmp_path / "a.PLY").read_bytes() == (tmp_path / "b.ply").read_bytes()
+
+
+def raw(path: Path, element: str) -> Any:
+    read: Any = trimesh.load(path, process=False)
+    return read.metadata["_ply_raw"][element]["data"]
+
+
+@pytest.mark.judges("Mesh.save")
+@cases("cmap", sorted(COLORMAPS))
+def test_values_become_colours_of_faces_or_vertices(tmp_path: Path, cmap: str) -> None:
+    """The least and the greatest value have the map's ends, and what is no number is grey."""
+    colored = Mesh(CUBE.vertices, CUBE.faces, normals=CUBE.vertex_normals(), colors=np.ones((8, 3)))
+    ends = {"viridis": [[68, 1, 84], [253, 231, 37]], "magma": [[0, 0, 4], [252, 253, 191]],
+            "coolwarm": [[59, 76, 192], [180, 4, 38]], "gray": [[0, 0, 0], [255, 255, 255]]}[cmap]  # fmt: skip
+    for element, count in (("face", 12), ("vertex", 8)):
+        values = np.linspace(2.0, 5.0, count)
+        values[1] = np.nan
+        colored.save(tmp_path / "a.ply", values, cmap)
+        found = raw(tmp_path / "a.ply", element)
+        np.testing.assert_array_equal(found["value"].ravel(), values)
+        colors = np.stack([found[name].ravel() for name in ("red", "green", "blue")], axis=1)
+        assert colors[[0, -1, 1]].tolist() == [*ends, [128] * 3]
+        again = load_mesh(tmp_path / "a.ply")
+        np.testing.assert_array_equal(again.vertices, CUBE.vertices)
+        np.testing.assert_array_equal(again.normals, colored.normals)
+        # A reader sees one colour a place: that of the value.
+        assert (again.colors is None) == (element == "face")
+        colored.save(tmp_path / "a.ply", values, cmap, limits=(5.0, 9.0))
+        assert [int(raw(tmp_path / "a.ply", element)[name].ravel()[-1]) for name in ("red", "green", "blue")] == ends[0]
+
+
+def test_what_values_belong_to_may_have_to_be_said(tmp_path: Path) -> None:
+    tetrahedron = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    for on, element in (("faces", "face"), ("vertices", "vertex")):
+        tetrahedron.save(tmp_path / "a.ply", range(4), on=on)  # type: ignore[arg-type]
+        assert raw(tmp_path / "a.ply", element)["value"].ravel().tolist() == [0.0, 1.0, 2.0, 3.0]
+    with pytest.raises(ValueError, match=r"^values: expected on='vertices' or on='faces'"):
+        tetrahedron.save(tmp_path / "a.ply", range(4))
+
+
+@pytest.mark.judges("Mesh.save")
+@cases(
+    ("given", "says"),
+    [
+        ({"path": "a.stl"}, "^path: expected a file name that ends in .ply, got "),
+        ({"path": 3}, "^path: expected a string or path, got int"),
+        ({"values": [1.0]}, "^values: expected 8 rows, one a vertex, or 12, one a face"),
+        ({"values": np.zeros((12, 3))}, r"^values: expected one value for each of the faces, got shape \(12, 3\)"),
+        ({"values": range(12), "cmap": "jet"}, "^cmap: expected one of .*'viridis'.*, got 'jet'"),
+        ({"values": range(12), "cmap": None}, "^cmap: expected one of .*, got None"),
+        ({"values": range(12), "limits": (1.0, 0.0)}, "^limits: expected two finite numbers, low <= high"),
+        ({"values": range(12), "limits": 1.0}, "^limits: expected two finite numbers"),
+        ({"values": range(12), "limits": (0.0, np.nan)}, "^limits: expected two finite numbers"),
+        ({"values": range(12), "on": "points"}, "^on: expected 'vertices', 'faces' or None, got 'points'"),
+    ],
+)
+def test_what_cannot_be_saved_is_said_and_nothing_is_written(tmp_path: Path, given: Any, says: str) -> None:
+    path = given.get("path", "a.ply")
+    with pytest.raises(ValueError, match=says):
+        CUBE.save(**{**given, "path": tmp_path / path if isinstance(path, str) else path})
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(OSError):
+        CUBE.save(tmp_path / "no" / "folder.ply")

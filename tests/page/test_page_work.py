@@ -432,3 +432,19 @@ def test_the_hint_goes_with_the_first_click(browser: Any, url: str) -> None:
         page.page.reload()
         page.page.wait_for_selector("body[data-ready]")
         assert page.page.is_hidden("#hint")
+
+
+def test_the_sun_turns_about_the_axis_that_is_up(browser: Any, tmp_path: Path) -> None:
+    """With z up a light that falls from above is high, whatever its y."""
+    text = SCENE.replace("ambient = 0.1", 'ambient = 0.1\nup = "z"', 1).replace(
+        "[-0.6, -1.4, -0.8]", "[0.0, 1.0, -1.0]"
+    )
+    (tmp_path / "z.toml").write_text(text)
+    with served(tmp_path / "z.toml") as address, Viewer(browser, address).open() as page:
+        assert page.page.input_value("[name=elevation]") == "45" and page.page.input_value("[name=azimuth]") == "0"
+        page.page.locator("[name=elevation]").fill("90")
+        settled(page)
+        light = load_scene(tmp_path / "z.toml").lights[0].model_copy(update={"direction": (0.0, 0.0, -1.0)})
+        fields = [page.page.locator(f"#lights details [aria-label='direction, {axis}']").first for axis in "xyz"]
+        found = [float(field.input_value()) for field in fields]
+        np.testing.assert_allclose(found, light.direction, atol=1e-12)

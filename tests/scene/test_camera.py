@@ -51,6 +51,7 @@ def test_row_zero_is_the_top_and_column_zero_the_left() -> None:
         np.testing.assert_allclose(ray, np.array([x / 2, y / 2, -1]) / math.sqrt(1.5), atol=4 * U)
 
 
+@pytest.mark.filterwarnings("ignore:.*radians")
 @cases("fov", [1.0, 45.0, 90.0, 170.0])
 @cases(("width", "height"), [(8, 8), (16, 4), (3, 9)])
 def test_fov_is_vertical_whatever_the_aspect(fov: float, width: int, height: int) -> None:

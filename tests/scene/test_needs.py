@@ -15,7 +15,7 @@ from renderer.mesh.shapes import box, grid, icosphere
 from renderer.picture.pack import pack
 from renderer.picture.prepare import build_octree, kernel_settings_of, tree_for
 from renderer.scene.camera import PerspectiveCamera
-from renderer.scene.light import DirectionalLight, PointLight
+from renderer.scene.light import DirectionalLight, PointLight, light_row
 from renderer.scene.material import Dielectric, Mirror, Phong
 from renderer.scene.needs import FEW_FACES, examine
 from renderer.scene.scene import Floor, RenderSettings, SceneObject
@@ -189,7 +189,7 @@ def test_highlights_are_there_with_and_without_a_diffuse_colour(diffuse: float) 
 def test_dark_lights_come_when_asked_for() -> None:
     what = scene(Phong(), lights=(DARK, SUN, DARK))
     needs = needs_of(what)
-    rows = np.array([light.row() for light in what.lights])
+    rows = np.array([light_row(light) for light in what.lights])
     for lights, kept in ((1, [1]), (2, [0, 1]), (3, [0, 1, 2])):
         np.testing.assert_array_equal(pack(what, replace(needs, lights=lights))[1].lights, rows[kept])
     assert picture(what, needs=replace(needs, lights=3)).rays.max() == 4 and picture(what).rays.max() == 2

@@ -62,7 +62,11 @@ def test_the_written_scene_is_the_one_that_is_rendered(tmp_path: Path, leads_to:
 @pytest.mark.parametrize("command", ["render", "info"])
 def test_the_command_line_takes_a_mesh(tmp_path: Path, capsys: Any, command: str) -> None:
     path, out, written = file_of(tmp_path, icosphere(2)), tmp_path / "out.png", tmp_path / "it.toml"
-    more = ["-o", str(out), "--resolution", "16x16", "--write-scene", str(written)] if command == "render" else []
+    more = (
+        ["-o", str(out), "--resolution", "16x16", "--up", "y", "--write-scene", str(written)]
+        if command == "render"
+        else []
+    )
     assert main([command, str(path), *more]) == 0
     assert capsys.readouterr().err == ""
     assert command == "info" or (out.exists() and load_scene(written).floor)

@@ -179,7 +179,7 @@ def test_the_command_line_says_what_was_cut_and_takes_a_budget(tmp_path: Path, c
     arguments = ["render", str(path), "-o", str(out), "--resolution", "20x16", "--quiet"]
     assert main([*arguments, "--max-rays", "100"]) == 0
     said = capsys.readouterr().err
-    assert "pixels miss rays: they took max_rays = 100 a sample" in said
+    assert "pixels miss rays: a sample reached max_rays = 100." in said
     assert len(said.splitlines()) == 1
     assert load_scene(path).render.max_rays == 16384
     assert out.exists()

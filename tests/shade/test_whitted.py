@@ -247,7 +247,7 @@ class TestShadows:
     def test_close_planes_cast_shadows_on_each_other(self) -> None:
         """A thousandth apart, a hundred away from the origin: no offset may jump the gap."""
         lower, upper = floor(100.0), quad((0, 100.001, 0), (0, 0, 0.4), (0.4, 0, 0))
-        camera = PerspectiveCamera(eye=(1, 100.0005, 0), target=(0, 100.0, 0), fov=1)
+        camera = PerspectiveCamera(eye=(1, 100.0005, 0), target=(0, 100.0, 0), fov=3)
         assert pixel(scene(camera, (lower, WHITE), (upper, WHITE), lights=(SUN,)))[0] == 0.0
         assert pixel(scene(camera, (lower, WHITE), lights=(SUN,)))[0] == pytest.approx(1.0, rel=REL)
 

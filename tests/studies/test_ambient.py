@@ -48,7 +48,7 @@ def test_a_wall_within_a_distance_hides_a_segment_of_the_disc(away, samples):
     """Directions that meet it within 1 have |x| >= away; over the disc of cosines that is cut off by a chord."""
     chord = min(away, 1.0)
     segment = (np.arccos(chord) - chord * np.sqrt(1.0 - chord**2)) / np.pi
-    found = ambient_occlusion(walls("x"), [[away, 0.0, 0.0]], [0, 0, 1], samples=samples, distance=1.0)
+    found = ambient_occlusion(walls("x"), [[away, 0.0, 0.0]], [0, 0, 1], samples=samples, max_distance=1.0)
     assert abs(found[0] - (1.0 - segment)) < bound(samples)
     assert away < 1.0 or found[0] == 1.0
 
@@ -89,7 +89,7 @@ def test_openness_beside_a_ball(samples, away):
         ("samples", 0, "an integer from 1 to"),
         ("samples", 2.5, "an integer from 1 to"),
         ("samples", True, "an integer from 1 to"),
-        ("distance", -1.0, "a number >= 0"),
+        ("max_distance", -1.0, "a number >= 0"),
         ("points", [[np.nan] * 3] * 4, "finite"),
         ("leaving", 99, "faces from 0 to 11"),
     ],

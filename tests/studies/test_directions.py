@@ -18,7 +18,7 @@ pytestmark = pytest.mark.judges(
 )  # fmt: skip
 
 
-MODULES = ["ambient", "directions", "hidden", "places", "sky", "views"]
+MODULES = ["ambient", "directions", "grid", "hidden", "places", "sky", "views"]
 
 
 @cases("name", MODULES)
@@ -108,6 +108,25 @@ def test_turned_patterns_look_about_their_pole():
         # No mirror image: the angles between directions and their order stay.
         assert np.linalg.det(np.linalg.lstsq(ways, turn, rcond=None)[0]) > 0.99
     assert (turned(ways, np.array([0.0, 0.0, 2.0])) == ways).all()
+
+
+@pytest.mark.judges("studies.Pattern.about")
+def test_a_pattern_about_normals_is_turned_about_each_of_them():
+    pattern = fibonacci_hemisphere(50)
+    normals = np.array([[[0, 0, 1], [0, 0, 5e-300], [0, 1, 0]], [[1, 2, -3], [0, 0, -1], [-1e300, 0, 1e300]]])
+    found = pattern.about(normals)
+    assert found.shape == (2, 3, 50, 3) and found.dtype == np.float64
+    for row, normal in zip(found.reshape(6, 50, 3), normals.reshape(6, 3), strict=True):
+        np.testing.assert_allclose(row, turned(pattern.directions, normal), rtol=0, atol=4e-16)
+        np.testing.assert_array_equal(pattern.about(normal), row)
+    assert (pattern.about([0, 0, 7]) == pattern.directions).all()
+    assert pattern.about(np.empty((0, 3))).shape == (0, 50, 3)
+    with pytest.raises(
+        ValueError, match=r"^normals: expected vectors that are not zero, got \[0.0, 0.0, 0.0\] in row 1"
+    ):
+        pattern.about([[0, 0, 1], [0, 0, 0]])
+    with pytest.raises(ValueError, match=r"^normals: expected shape \(\.\.\., 3\)"):
+        pattern.about([0, 1])
 
 
 @cases("make", [fibonacci_hemisphere, fibonacci_sphere, cosine_hemisphere, reinhart])

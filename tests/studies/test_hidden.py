@@ -20,6 +20,7 @@ from renderer.studies import (
     fibonacci_sphere,
     occlusion,
     openness,
+    scan,
     sky_view_factor,
     sun_hours,
     tregenza,
@@ -176,9 +177,9 @@ def test_whether_points_lie_on_the_surface_is_found_out_and_their_normals_say_th
 def test_nothing_hides_beyond_the_distance():
     octree = Octree.from_mesh(box())
     points, ways = [[3.0, 0.5, 0.25]], [[-1.0, 0.0, 0.0], [-0.125, 0.0, 0.0], [-8.0, 0.0, 0.0]]
-    assert occlusion(octree, points, None, ways, distance=2.0).tolist() == [1.0]
-    assert occlusion(octree, points, None, ways, distance=np.nextafter(2.0, 0.0)).tolist() == [0.0]
-    assert occlusion(octree, points, None, ways, distance=0).tolist() == [0.0]
+    assert occlusion(octree, points, None, ways, max_distance=2.0).tolist() == [1.0]
+    assert occlusion(octree, points, None, ways, max_distance=np.nextafter(2.0, 0.0)).tolist() == [0.0]
+    assert occlusion(octree, points, None, ways, max_distance=0).tolist() == [0.0]
 
 
 def test_faces_without_a_plane_are_left_as_any_hit_leaves_them():
@@ -213,8 +214,8 @@ GOOD = {"points": np.zeros((4, 3)), "normals": np.ones((4, 3)), "directions": np
         ("leaving", 12, "faces from 0 to 11, or -1"),
         ("leaving", 0.5, "integer"),
         ("packed", 1, "True or False"),
-        ("distance", -1, ">= 0"),
-        ("distance", [1, 2], "a number"),
+        ("max_distance", -1, ">= 0"),
+        ("max_distance", [1, 2], "a number"),
         ("threads", 0, "integer >= 1"),
         ("progress", "yes", "True or False"),
         ("octree", box(), "an Octree"),
@@ -248,7 +249,7 @@ def test_bits_of_points_that_are_traced_together(mesh, seed, count, apart, leave
         leaving = rng.integers(0, len(faces), count)
         points = inside_of(octree.mesh.triangles[leaving], rng)
     reach = extent * float(rng.choice([0.5, np.inf]))
-    bits = occlusion(octree, points, None, ways, leaving=leaving, packed=True, distance=reach)
+    bits = occlusion(octree, points, None, ways, leaving=leaving, packed=True, max_distance=reach)
     expected = written_down(octree, points, None, ways, leaving, reach)
     np.testing.assert_array_equal(unpacked(bits, len(ways)), expected)
 
@@ -311,3 +312,26 @@ def test_nothing_of_the_size_of_points_times_directions_is_made() -> None:
         assert tracemalloc.get_traced_memory()[1] < 15e6 + 6e6
     finally:
         tracemalloc.stop()
+
+
+def test_distance_is_the_former_name_of_max_distance() -> None:
+    """The same bits by both names, and an error for both at once."""
+    octree, up = Octree.from_mesh(box((0, -9, 0), (1, 9, 9))), [0.0, 0.0, 1.0]
+    points, ways = [[3.0, 0.0, 0.0], [1.5, 0.0, 0.5]], tregenza().directions
+    asked: dict[str, Any] = {
+        "occlusion": lambda **of: occlusion(octree, points, up, ways, **of),
+        "ambient_occlusion": lambda **of: ambient_occlusion(octree, points, up, **of),
+        "openness": lambda **of: openness(octree, points, **of),
+        "sky_view_factor": lambda **of: sky_view_factor(octree, points, **of),
+        "sun_hours": lambda **of: sun_hours(octree, points, up, ways, **of),
+        "scan": lambda **of: scan(octree, points[0], 500, **of).distances,
+    }
+    for name, ask in asked.items():
+        near, far = ask(max_distance=1.0), ask()
+        assert near.tobytes() != far.tobytes(), name
+        assert ask(distance=1.0).tobytes() == near.tobytes() and ask(distance=np.inf).tobytes() == far.tobytes()
+        with pytest.raises(ValueError, match=r"^distance: expected max_distance alone, .*, got both"):
+            ask(distance=1.0, max_distance=2.0)
+        for former in ("distance", "max_distance"):
+            with pytest.raises(ValueError, match=f"^{former}: expected a number >= 0, got nan"):
+                ask(**{former: np.nan})

@@ -58,7 +58,7 @@ def test_a_scan_is_that_of_its_slow_twin(
         ways = fibonacci_sphere(60).directions
     given: Any = {"number": np.int64(60), "pattern": Pattern(ways, np.ones(60)), "array": FORMS[form](ways)}[kind]
     with patch.object(views, "_ROWS", together):
-        cloud = scan(target, FORMS[form](place), given, distance=distance)
+        cloud = scan(target, FORMS[form](place), given, max_distance=distance)
     face, away = first_hits(np.broadcast_to(place, ways.shape), ways)
     rays = np.flatnonzero((face >= 0) & (away <= distance))
     np.testing.assert_array_equal(cloud.rays, rays)

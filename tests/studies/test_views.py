@@ -168,7 +168,7 @@ def test_rows_of_a_camera_of_ones_own_may_be_a_list():
         (lambda o: scan(o, [0, 0, 9], 0), "pattern", "an integer from 1"),
         (lambda o: scan(o, [0, 0, 9], np.int64(0)), "pattern", "an integer from 1"),
         (lambda o: scan(o, [0, 0, 9], [[0, 0, 0]]), "pattern", "in row 0"),
-        (lambda o: scan(o, [0, 0, 9], distance=-1), "distance", "a number >= 0"),
+        (lambda o: scan(o, [0, 0, 9], max_distance=-1), "max_distance", "a number >= 0"),
     ],
 )
 def test_bad_arguments_are_named(ask, argument, said):
@@ -206,8 +206,8 @@ def test_a_scanner_on_the_surface_meets_what_leads_through_it_at_once_and_none_b
             np.testing.assert_allclose(cloud.points, np.tile([x, 0.0, z], (len(through), 1)), rtol=0, atol=1e-15)
     with pytest.raises(ValueError, match="normal: expected"):
         scan(floor, [0.1, 0.0, 0.1], ways, normal=[0, 0, 0])
-    assert scan(floor, [0.1, 3.0, 0.1], ways, distance=3).distances.tolist() == [3.0]
-    assert len(scan(floor, [0.1, 3.0, 0.1], ways, distance=np.nextafter(3.0, 0.0)).rays) == 0
+    assert scan(floor, [0.1, 3.0, 0.1], ways, max_distance=3).distances.tolist() == [3.0]
+    assert len(scan(floor, [0.1, 3.0, 0.1], ways, max_distance=np.nextafter(3.0, 0.0)).rays) == 0
 
 
 def test_an_eye_on_a_sheet_sees_past_it_and_not_past_others() -> None:

@@ -93,3 +93,23 @@ def test_what_compiles_beside_ends_with_its_parent(tmp_path):
         assert child.wait(timeout=60) == 1
     finally:
         child.kill()
+
+
+AGAIN = """
+import atexit, os, signal
+from renderer.system.interrupt import interruptible
+def interrupt():
+    os.kill(os.getpid(), signal.SIGINT)
+    for _ in range(1000): pass
+atexit.register(interrupt)
+@interruptible("it ends")
+def main(arguments=None):
+    interrupt()
+main()
+"""
+
+
+def test_a_second_interrupt_while_the_process_ends_shows_no_traceback():
+    """As where a thread still compiles, for which Python waits."""
+    done = subprocess.run([sys.executable, "-c", AGAIN], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (-signal.SIGINT, "it ends\n")

@@ -107,7 +107,7 @@ def things() -> dict[str, Any]:
         "pattern": studies.tregenza(), "places": studies.face_points(BALL), "study": Study("sky", {"patches": 9}),
         "scan": studies.scan(octree, [0, 0, 0], 9), "points": on_faces(octree).points,
         "errors": [kind("a line") for kind in (renderer.MeshError, renderer.SceneError, renderer.CutWarning,
-                                               renderer.RepairWarning)],
+                                               renderer.RepairWarning, renderer.SceneWarning)],
     }  # fmt: skip
     return found
 

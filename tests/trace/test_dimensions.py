@@ -73,6 +73,83 @@ def test_origins_and_directions_are_broadcast(queries):
     )
 
 
+RAYS = {"origins": ORIGINS[:6].reshape(2, 3, 3), "directions": -ORIGINS[:3]}
+# The same, one argument after the other with dimensions of its own.
+BROADCAST = {
+    "t_max of a row": {"t_max": [[0.9], [np.inf]]},
+    "t_min of a column, t_max of more": {"t_min": [0.0, 0.25, 3.0], "t_max": np.linspace(0.2, 3.0, 8).reshape(4, 2, 1)},
+    "one": {"t_min": [0.25], "t_max": [[[2.0]]]},
+}
+
+
+@pytest.mark.judges("Octree.closest_hit", "Octree.any_hit", "Octree.all_hits", "Octree.count_hits")
+@cases("bounds", BROADCAST)
+@cases("queries", QUERIES)
+def test_bounds_are_broadcast_with_the_rays(queries, bounds):
+    given = BROADCAST[bounds]
+    shape = np.broadcast_shapes((2, 3), *(np.shape(bound) for bound in given.values()))
+    whole = {name: np.broadcast_to(rays, (*shape, 3)).reshape(-1, 3).copy() for name, rays in RAYS.items()}
+    whole |= {name: np.broadcast_to(bound, shape).reshape(-1).copy() for name, bound in given.items()}
+    hits, flat = queries.closest_hit(**RAYS, **given), queries.closest_hit(**whole)
+    assert hits.t.shape == shape and 0 < flat.hit.sum() < flat.hit.size
+    for name in ("t", "face", "u", "v", "side"):
+        np.testing.assert_array_equal(getattr(hits, name).reshape(-1), getattr(flat, name))
+    np.testing.assert_array_equal(queries.any_hit(**RAYS, **given), hits.hit, strict=True)
+    np.testing.assert_array_equal(queries.count_hits(**RAYS, **given).reshape(-1), queries.count_hits(**whole))
+    np.testing.assert_array_equal(queries.all_hits(**RAYS, **given).t, queries.all_hits(**whole).t)
+
+
+@cases("queries", QUERIES)
+def test_one_ray_and_many_bounds_are_many_rays(queries):
+    hits = queries.closest_hit([0, 0, 3], [0, 0, -1], t_max=[1.0, 2.5, np.inf])
+    assert hits.hit.tolist() == [False, True, True]
+    assert queries.closest_hit([0, 0, 3], [0, 0, -1], t_max=np.empty(0)).t.shape == (0,)
+
+
+@cases("queries", QUERIES)
+def test_starts_are_broadcast_with_the_rays(queries):
+    """Many directions from each of some hits, and from faces and sides by number."""
+    hits = queries.closest_hit(ORIGINS[:5], -ORIGINS[:5])
+    starts, repeated = hits.points[:, None], np.repeat(hits.points, 7, axis=0)
+    ways = np.tile(DIRECTIONS[:7], (5, 1))
+    face, side = np.repeat(hits.face, 7), np.repeat(hits.side, 7)
+    flat = queries.closest_hit(repeated, ways, leaving=face, side=side)
+    assert 0 < flat.hit.sum() < flat.hit.size
+    by_face = queries.closest_hit(starts, DIRECTIONS[:7], leaving=hits.face[:, None], side=hits.side[:, None])
+    np.testing.assert_array_equal(by_face.t, flat.t.reshape(5, 7))
+    np.testing.assert_array_equal(
+        queries.closest_hit(starts[0, 0], DIRECTIONS[:7], leaving=hits.face[:1]).t.shape, (7,)
+    )
+    for left in (lambda hits: hits, Hits.through):
+        column = left(hits.shaped((5, 1)))
+        expected = [
+            queries.closest_hit(hits.points[k], way, leaving=left(queries.closest_hit(ORIGINS[k], -ORIGINS[k]))).t
+            for k in range(5)
+            for way in DIRECTIONS[:7]
+        ]
+        np.testing.assert_array_equal(
+            queries.closest_hit(starts, DIRECTIONS[:7], leaving=column).t.reshape(-1), expected
+        )
+
+
+@pytest.mark.judges("Octree.closest_point", "Octree.signed_distance", "Octree.visible")
+@cases("queries", QUERIES)
+def test_distances_and_ends_are_broadcast_with_the_points(queries):
+    limits = np.array([[0.25], [1.0], [np.inf]])
+    near, distance = queries.closest_point(ORIGINS, limits), queries.signed_distance(ORIGINS, limits)
+    for k, limit in enumerate(limits[:, 0]):
+        np.testing.assert_array_equal(near.face[k], queries.closest_point(ORIGINS, limit).face, strict=True)
+        np.testing.assert_array_equal(distance[k], queries.signed_distance(ORIGINS, limit), strict=True)
+    assert queries.closest_point(ORIGINS[0], limits[:, 0]).found.shape == (3,)
+    hits = queries.closest_hit(ORIGINS[:5], -ORIGINS[:5])
+    seen = queries.visible(hits.points[:, None], ORIGINS[:7], leaving=hits.face[:, None])
+    for k in range(5):
+        alone = queries.visible(hits.points[k], ORIGINS[:7], leaving=int(hits.face[k]))
+        np.testing.assert_array_equal(seen[k], alone, strict=True)
+    faces = np.array([hits.face[0], -1])
+    assert queries.visible(hits.points[0], ORIGINS[0], leaving=faces).shape == (2,)
+
+
 def test_what_serves_all_is_not_copied():
     eye, one = np.array([0.0, 0.0, 3.0]), np.array([0.0, 0.0, -1.0])
     many = RNG.normal(size=(4, 6, 3))

@@ -26,7 +26,7 @@ from renderer.system import files
 from renderer.trace.layout import BLOCK_WORDS, CACHE_LINE, CHILDREN, NODE_WORDS
 from renderer.tree import store
 
-pytestmark = pytest.mark.judges("Mesh.viewing", "Octree.load", "Octree.save")
+pytestmark = pytest.mark.judges("Octree.load", "Octree.save")
 
 
 MAPPED = pytest.mark.parametrize("mmap", [False, True], ids=["read", "mapped"])
@@ -149,6 +149,15 @@ def test_the_file_is_as_its_description_says(path: Path) -> None:
         assert entry["crc32"] == zlib.crc32(content[begin:filled])
         begin = filled
     assert begin == len(content)
+
+
+def test_a_mesh_of_several_parts_has_them_in_its_file(path: Path) -> None:
+    mesh = Mesh.concatenate(carrying(), icosphere(0), name="both")
+    Octree(mesh).save(path)
+    content = path.read_bytes()
+    told = json.loads(content[24 : 24 + struct.unpack("<I", content[16:20])[0]])
+    assert told.keys() == {"depth", "scale", "name", "arrays", "parts"}
+    assert told["parts"] == [["a\ud800ü", len(carrying().faces)], ["icosphere", 20]]
 
 
 # --- memory -----------------------------------------------------------------------------------------------------
@@ -387,6 +396,12 @@ HEADERS: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     "a list for a type": (entry("blocks", dtype=["<f8"]), "blocks: expected the type"),
     "rows 2^32": (entry("faces", rows=2**32), "faces: expected rows and crc32 from 0"),
     "rows 2^31": (entry("faces", rows=2**31), "size: expected "),
+    "parts a name": (lambda told: told.update(parts="body"), "parts: expected pairs of a name and a number of faces"),
+    "a part a name": (lambda told: told.update(parts=["body"]), "parts: expected pairs"),
+    "a part of three": (lambda told: told.update(parts=[["body", 1, 2]]), "parts: expected pairs"),
+    "a part without a name": (lambda told: told.update(parts=[[1, 1]]), "parts: expected pairs"),
+    "a part of -1 faces": (lambda told: told.update(parts=[["body", -1]]), "parts: expected pairs"),
+    "a part of one face": (lambda told: told.update(parts=[["body", 1]]), "parts: expected "),
     "crc -1": (entry("faces", crc32=-1), "faces: expected rows and crc32 from 0"),
 }  # fmt: skip
 

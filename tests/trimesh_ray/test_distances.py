@@ -1,5 +1,6 @@
 """Nearest points, signed distances and thickness of trimesh by the octree: exact, and signed as trimesh signs."""
 
+import sys
 from collections.abc import Iterator
 from fractions import Fraction
 from typing import Any
@@ -133,3 +134,18 @@ def test_a_ray_that_leaves_a_torn_mesh_ends_the_vote() -> None:
     vertices = np.concatenate([corners, torn]).reshape(-1, 3)
     traced = Traced(vertices, np.arange(len(vertices)).reshape(-1, 3))
     assert not points_within(traced, np.zeros((1, 3))).any()
+
+
+@pytest.mark.judges("trimesh_ray.install", "trimesh_ray.installed")
+@pytest.mark.parametrize("missing", ["rtree", "scipy"])
+def test_thickness_needs_no_rtree(monkeypatch: pytest.MonkeyPatch, missing: str) -> None:
+    """trimesh's own nearest points need it, so that rays alone were not enough."""
+    with installed():
+        own = trimesh.proximity.closest_point
+    assert own is not closest_point
+    monkeypatch.setitem(sys.modules, missing, None)
+    with installed():
+        assert trimesh.proximity.closest_point is closest_point
+        found = trimesh.proximity.thickness(trimesh.creation.box(), [[0.1, 0.2, 0.5]], method="ray")
+    assert found.tolist() == [1.0]
+    assert trimesh.proximity.closest_point is own

@@ -32,6 +32,7 @@ pytestmark = pytest.mark.judges(
     "octree-validate --random",
     "octree-validate --scene",
     "octree-validate --write-baseline",
+    "octree-validate meshes",
 )
 
 
@@ -65,7 +66,7 @@ def sections(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathF
     templates = tmp_path_factory.mktemp("templates")
     (templates / "plain.html").write_text("<p>a section</p>")
     monkeypatch.setattr(report, "_TEMPLATES", [report._TEMPLATES, templates])
-    plain = {name: (title, "plain.html") for name, (title, _) in report.PARTIALS.items()}
+    plain = {name: partial._replace(template="plain.html") for name, partial in report.PARTIALS.items()}
     monkeypatch.setattr(report, "PARTIALS", plain)
     fakes = {name: Fake(name) for name in report.PARTIALS}
     modules = {section.module: section.name for section in SECTIONS}
@@ -99,7 +100,7 @@ def test_a_failing_gate_is_exit_code_1_and_named_everywhere(
     assert "FAILED hits: torus: leaks is 3, expected at most 0" in out
     assert "validation: FAIL, 1 of 2 gates" in out
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
-    assert "FAIL" in page and page.index("torus: leaks") < page.index('id="checked"')
+    assert "FAIL" in page and page.index("torus: leaks") < page.index('id="sections"')
     assert "a closed mesh has no holes" in (tmp_path / "junit.xml").read_text(encoding="utf-8")
 
 
@@ -121,8 +122,8 @@ class TestUserFiles:
         assert all(reason in page for reason in left_out.values())
 
     def test_scene_and_mesh(self, tmp_path: Path, sections: dict[str, Fake]) -> None:
-        assert command.main(["--scene", str(SCENE), "--mesh", str(MESH), "--output", str(tmp_path)]) == 0
-        assert sections["hits"].jobs[0].meshes == (MESH,)
+        assert command.main(["--scene", str(SCENE), "--mesh", str(MESH), str(MESH), "--output", str(tmp_path)]) == 0
+        assert sections["hits"].jobs[0].meshes == (MESH, MESH)
         assert metrics(tmp_path)["left_out"].keys() == set(NAMES) - {"images", "hits"}
 
     def test_the_seed_of_random_scenes_is_theirs_alone(
@@ -132,7 +133,7 @@ class TestUserFiles:
         assert sections["random"].jobs[0].seed == 7
         with pytest.raises(SystemExit):
             command.main(["--scene", str(SCENE), "--random", "7", "--output", str(tmp_path)])
-        assert "--random is of the section random, which does not run" in capsys.readouterr().err
+        assert "--random: the section random does not run" in capsys.readouterr().err
 
     @pytest.mark.parametrize(
         ("option", "text"), [("--scene", "camera = 3"), ("--mesh", "ply?"), ("--gate", "[hits]\nmagic = 1")]
@@ -165,6 +166,12 @@ class TestUserFiles:
         (["--defects", "--mesh", "a.ply"], "got --mesh too"),
         (["--defects", "--write-baseline"], "--defects goes with --output and --quick alone, got --write-baseline too"),
         (["--write-baseline", "--gate", "a.toml"], "got --gate too"),
+        (["--record", "a.json"], "--record: expected one mesh after the file, got 0"),
+        (["--compare", "a.json", "a.ply", "b.ply"], "--compare: expected at most one mesh after the file, got 2"),
+        (["--compare", "a.json", "--quick"], "got --quick too"),
+        (["--record", "a.json", "--compare", "a.json", "a.ply"], "got --compare too"),
+        (["--tolerance", "0"], "--tolerance goes with --compare, got none"),
+        (["--compare", "a.json", "--tolerance", "-1"], "expected a number from 0, got '-1'"),
     ],
 )
 def test_arguments_at_odds_are_refused(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:

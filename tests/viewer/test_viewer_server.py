@@ -336,9 +336,9 @@ def test_of_many_scenes_asked_for_the_newest_is_opened(folder: Path, monkeypatch
     opened: list[str] = []
     open_one = app.open_file
 
-    def counting(path: Path) -> ShownScene:
+    def counting(path: Path, up: Any) -> ShownScene:
         opened.append(path.name)
-        return open_one(path)
+        return open_one(path, up)
 
     monkeypatch.setattr(app, "open_file", counting)
     with renderer.view(folder / "blocks.toml", browser=False) as viewing, Client(viewing.url) as client:

@@ -77,8 +77,8 @@ def test_a_mesh_that_changes_while_its_scene_is_loaded_counts_as_edited(
     file.write_text(SCENE.replace(str(MODELS / "block.ply"), "block.ply"))
     assert not open_file(file).edited
 
-    def slow(path: Path) -> Any:
-        scene = load_scene(path)
+    def slow(path: Path, **options: Any) -> Any:
+        scene = load_scene(path, **options)
         mesh.write_bytes((MODELS / "stairs.ply").read_bytes())
         return scene
 
@@ -148,10 +148,10 @@ def test_an_edit_while_another_scene_is_opened_does_not_bring_the_old_one_back(
     begun, edited = threading.Event(), threading.Event()
     open_one = app.open_file
 
-    def slow(path: Path) -> ShownScene:
+    def slow(path: Path, up: Any) -> ShownScene:
         begun.set()
         assert edited.wait(PATIENCE)
-        return open_one(path)
+        return open_one(path, up)
 
     async def scenario(page: Page) -> None:
         monkeypatch.setattr(app, "open_file", slow)

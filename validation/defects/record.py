@@ -8,34 +8,35 @@ from validation.defects.answers import Answer
 from validation.defects.seeded.defect import Defect
 from validation.gates import Gate
 
-_PATHS = "checks the other reference, whose recursion is like ours: a rule that both have wrong shows on paths alone"
+_PATHS = "checks the Whitted reference, whose recursion is like ours: only paths show an error that both share"
+_REFLECTED = "shows what users would see: fifty reflections, each from where the last one ended"
 # Quantities that measure the same as another: over other pixels, or the same verdict on other rays.
 _VIEWS = {
     "ssim_foreground": "ssim",
     "fragile share of the glass": "fragile_share",
     "pixels whose position is off": "pixels whose distance is off",
-    "of the exact sample, rays on which we are wrong": "rays on which we are wrong",
-    "wrong verdicts": "rays on which we are wrong",
-    "t beyond its bound": "rays on which we are wrong",
+    "wrong hits in the exact sample": "wrong hits",
+    "t beyond its bound": "wrong hits",
 }
-# Kinds of gates that are kept though they catch no defect alone, by the beginning of their names, with the reasons.
+# Kinds of gates that are kept though they catch no defect alone, with the reasons; a key is a kind, see ``kind_of``.
 KEPT = {
-    "extreme case": "each is a promise for one construct, and says in words what broke",
-    "ssim": "others publish it, and it tells broken structure from wrong brightness; FLIP and the maximum see more",
-    "asked a few at a time": "few rays go by a kernel of their own, which other gates ask by chance only",
-    "references that judge it": "guards the others: without it a rung that nobody judges would pass",
-    "rays on which we are wrong": "judges all families by the thousand; extreme cases see the same faults on few rays",
-    "differ from a new build": "asks every mesh again after it moved, of which extreme cases have two",
-    "rays within float64 rounding": "guards the count of wrong rays, which excuses what float64 cannot decide",
-    "rays stopped at once, or not, against the law": "judges each ray by exact signs; sees what others see on few rays",
-    "rays that name no face, stopped against the law": "the same rays where they leave nothing: ties at t = 0",
-    "rays from inside that are lost": "counts all rays where the exact sample has a few",
-    "of the exact sample, rays from a surface with a wrong hit": "judges what is hit beyond the start, to its t",
-    "rays that go through other faces than all": "asks faces that coincide, one after the other, as users go through",
-    "pixels that see what they cannot": "what users see of the law, through all that pictures do with it",
-    "reflected rays": "what users see of the law: each reflection starts where the one before ended, fifty times",
-    "points with another sky where their face is named": "asks all points, of which exact arithmetic judges some",
-    "slope of log RMSE": _PATHS,
+    "extreme case": "each tests one construct, and names what broke",
+    "ssim": "widely published, and separates broken structure from wrong brightness",
+    "other hits in small batches": "small batches use a kernel of their own, which other gates reach by chance",
+    "references": "guards the others: without it a step without a reference would pass",
+    "wrong hits": "judges thousands of rays of each family; extreme cases see the same faults on few rays",
+    "hits that differ from a new build": "traces every mesh again after it moved; extreme cases have two such meshes",
+    "rays within rounding of an edge": "guards the count of wrong hits, which excuses what float64 cannot decide",
+    "rays that wrongly stop or pass at their start": "judges each ray by exact signs; others see few of them",
+    "rays without leaving that wrongly stop or pass": "the same rays where they leave nothing: ties at t = 0",
+    "rays that escape from inside": "counts all rays where the exact sample has a few",
+    "wrong hits from surfaces in the exact sample": "judges the hits beyond the start, with t",
+    "rays that pass other faces than their lines": "passes coinciding faces one after the other, as users do",
+    "pixels that see the hidden sky": "shows in pictures what users would see",
+    "reflected rays that escape": _REFLECTED,
+    "reflected rays that stay in place": _REFLECTED,
+    "points whose sky changes when their face is named": "checks all points, of which exact arithmetic judges some",
+    "distance of the slope of log RMSE from -1/2": _PATHS,
     "p-value of the largest z": _PATHS,
 }
 
@@ -78,10 +79,10 @@ def _row(defect: Defect, answer: Answer) -> dict[str, Any]:
 def gates(chosen: Sequence[Defect], control: Answer, answers: Sequence[Answer]) -> list[Gate]:
     """The control must fail no gate; each defect at least one. A process that ended with an error proves neither."""
     red = float("nan") if control.error else float(len(control.red))
-    found = [Gate("defects", "no defect", "gates turned red", red, "at most", 0.0, "what is sound must pass")]
+    found = [Gate("defects", "no defect", "gates turned red", red, "at most", 0.0, "the sound renderer must pass")]
     for defect, answer in zip(chosen, answers, strict=True):
         count = float("nan") if answer.error else float(len(answer.red))
-        reason = "a suite that lets a defect through proves nothing"
+        reason = "a suite that misses a defect proves nothing"
         found.append(Gate("defects", defect.name, "gates turned red", count, "at least", 1.0, reason))
     return found
 
@@ -103,4 +104,4 @@ def kind_of(name: str) -> str:
 
 
 def _kept(kind: str) -> str | None:
-    return next((reason for begin, reason in KEPT.items() if kind.startswith(begin)), None)
+    return KEPT.get("extreme case" if kind.startswith("extreme case") else kind)

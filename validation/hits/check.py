@@ -179,17 +179,27 @@ def _check(target: _Target, rays: RayFamily, effort: HitEffort, limits: HitLimit
     }
 
     # Make the gates; a family that is not aimed at edges must not come within rounding of one.
-    judge = "exact arithmetic says so"
+    judge = "exact arithmetic decides"
     quantities = [
-        ("rays on which we are wrong", len(wrong), limits.wrong, judge),
-        ("of the exact sample, rays on which we are wrong", found.errors.wrong, limits.wrong, judge),
-        ("any-hit differs from closest hit", found.any_hit_differs, limits.any_hit_differs, "one definition of a hit"),
-        ("asked a few at a time, rays with another hit", found.few_differ, limits.few_differ, "one answer a ray"),
+        ("wrong hits", len(wrong), limits.wrong, judge),
+        ("wrong hits in the exact sample", found.errors.wrong, limits.wrong, judge),
+        (
+            "any_hit differs from closest_hit",
+            found.any_hit_differs,
+            limits.any_hit_differs,
+            "both queries share one definition of a hit",
+        ),
+        (
+            "other hits in small batches",
+            found.few_differ,
+            limits.few_differ,
+            "a ray's answer does not depend on its batch",
+        ),
     ]
     flat = not np.ptp(target.mesh.vertices[target.mesh.faces].reshape(-1, 3), axis=0).all()
     if rays.name in UNAIMED and not (flat and rays.name in _IN_THE_BOX):
-        reason = "nothing aims there"
-        quantities.append(("rays within float64 rounding of an edge", near_edge, limits.near_edge, reason))
+        reason = "no ray of this family aims at an edge"
+        quantities.append(("rays within rounding of an edge", near_edge, limits.near_edge, reason))
     subject = f"{target.name}, {rays.name} rays"
     return record, [Gate("hits", subject, q, float(v), "at most", most, why, _NAMES) for q, v, most, why in quantities]
 

@@ -45,8 +45,8 @@ def check_mirrors(job: Job, rays: int | None = None, make: Callable[..., Any] = 
             records.append({"body": name, "kind": kind, "rays": count, "lost": lost, "stuck": stuck})
             subject = f"{name} of mirrors, {count:,} {kind} rays, {BOUNCES} reflections"
             for quantity, value, reason in (
-                ("reflected rays that are lost", lost, "a closed body has no holes"),
-                ("reflected rays that stay where they are", stuck, f"no corner reflects a ray {STAYS} times"),
+                ("reflected rays that escape", lost, "a closed body has no holes"),
+                ("reflected rays that stay in place", stuck, f"no corner reflects a ray {STAYS} times"),
             ):
                 gates.append(Gate("hits", subject, quantity, float(value), "at most", 0.0, reason))
     return records, gates

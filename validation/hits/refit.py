@@ -12,7 +12,7 @@ from validation.job import Job
 
 _SEED = 2030
 _RAYS = 3_000
-_QUANTITY = "differ from a new build"
+_QUANTITY = "hits that differ from a new build"
 # Each change moves faces out of their old boxes: stretched and moved away, and turned inside out along one axis.
 _CHANGES = {
     "stretched and moved": (np.array([2.0, 0.5, 1.0]), np.array([3.0, 0.0, 0.0])),
@@ -39,6 +39,6 @@ def check_refit(job: Job) -> tuple[list[dict[str, Any]], list[Gate]]:
             differing = int(((first.t != second.t) | (first.face != second.face)).sum())
             subject = f"refitted sphere, {change}, {rays.name} rays"
             records.append({"subject": subject, "rays": len(rays), "differing": differing})
-            reason = "the same vertices and faces have the same hits"
+            reason = "equal vertices and faces give equal hits"
             gates.append(Gate("hits", subject, _QUANTITY, float(differing), "at most", 0.0, reason, ("Octree.refit",)))
     return records, gates

@@ -39,7 +39,7 @@ _MOVE, _EXACTLY = 2.0**-36, 2.0**-30
 # decide: edge functions of less than this share of their terms. Farther off, as any ray, it may pass an edge on either
 # side that it passes by no more than its start is moved.
 _CLOSEST, _NEAR = Fraction(1, 1 << 84), 2.0**-30
-_REASON = "exact arithmetic says so"
+_REASON = "exact arithmetic decides"
 
 
 @dataclass(frozen=True)
@@ -105,10 +105,10 @@ def check_starts(job: Job, effort: StartEffort | None = None, make: Callable[...
 def _gates(record: dict[str, Any]) -> list[Gate]:
     subject = f"{record['family']}, {record['rays']:,} rays that start on them"
     quantities = [
-        ("rays stopped at once, or not, against the law", "at_once", _REASON),
-        ("rays that name no face, stopped against the law", "unnamed", _REASON),
-        ("rays from inside that are lost", "lost", "a closed body has no holes"),
-        ("of the exact sample, rays from a surface with a wrong hit", "sample", _REASON),
+        ("rays that wrongly stop or pass at their start", "at_once", _REASON),
+        ("rays without leaving that wrongly stop or pass", "unnamed", _REASON),
+        ("rays that escape from inside", "lost", "a closed body has no holes"),
+        ("wrong hits from surfaces in the exact sample", "sample", _REASON),
     ]
     return [Gate("hits", subject, name, float(record[key]), "at most", 0.0, why) for name, key, why in quantities]
 

@@ -37,7 +37,10 @@ def check_walks(job: Job, rays: int | None = None, make: Callable[..., Any] = Oc
         before = totals.get(body.family, (0, 0))
         totals[body.family] = (before[0] + count, before[1] + wrong)
     records = [{"family": family, "rays": sent, "wrong": wrong} for family, (sent, wrong) in totals.items()]
-    reason, quantity = "what a line meets is met, each face once", "rays that go through other faces than all"
+    reason, quantity = (
+        "a ray that goes on passes each face of its line once",
+        "rays that pass other faces than their lines",
+    )
     gates = [
         Gate("hits", f"{family}, {sent:,} rays through them", quantity, float(wrong), "at most", 0.0, reason)
         for family, (sent, wrong) in totals.items()

@@ -28,13 +28,13 @@ def compare(
     """
     hit, other = ours.face >= 0, theirs.instance >= 0
     errors = _errors(scene, ours, theirs, hit & other)
-    shares = {"pixels that only one of us hits": float(np.mean(hit != other))}
+    shares = {"pixels that only one renderer hits": float(np.mean(hit != other))}
     off = hit != other
     for quantity, (error, limit) in _limited(errors, limits).items():
         beyond = ~(error <= limit)
         off[hit & other] |= beyond
         shares[f"pixels whose {quantity} is off"] = float(np.sum(beyond) / hit.size)
-    reason = f"{limits.depth} of the distance, normals {limits.normal} rad; a float32 ray may flip an edge pixel"
+    reason = f"within {limits.depth} of the distance and {limits.normal} rad; a float32 ray may flip an edge pixel"
     found = [
         Gate("images", f"{name}, AOVs", quantity, share, "at most", limits.share, reason, ("Image",))
         for quantity, share in shares.items()

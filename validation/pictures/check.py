@@ -90,7 +90,7 @@ def _encoding(subject: str, pair: Pair) -> Gate:
     """Gate on ``Image.save``: the reference's radiance, saved and read back, against the formula of sRGB."""
     radiance = pair.reference.astype(np.float32)
     off = np.abs(_saved(replace(pair.ours, radiance=radiance)) - 255.0 * compare.srgb(radiance)).max()
-    reason = "a saved picture is the formula's sRGB, rounded"
+    reason = "saved pixels follow the sRGB formula, rounded"
     return Gate(
         "images", subject, "8-bit steps from the formula", float(off), "at most", _STEPS, reason, ("Image.save",)
     )

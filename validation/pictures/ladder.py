@@ -63,7 +63,7 @@ def rungs(scene: Scene) -> tuple[list[Rung], dict[str, str]]:
     for level, name in enumerate(NAMES[:_EVERYTHING]):
         derived = _derived(scene, level)
         if name not in left_out and _same(derived, scene):
-            left_out[name] = "it is the scene as it is already, so it is judged as everything"
+            left_out[name] = "equal to the whole scene, which is judged as everything"
         if name not in left_out:
             found.append(Rung(name, _ADDS[name], derived))
     return [*found, Rung("everything", _ADDS["everything"], scene)], left_out

@@ -168,7 +168,7 @@ def _without_transmission(scene: Scene) -> tuple[Scene, list[str]]:
         if isinstance(material, Phong) and material.passes_light
     }
     left_out = [f"materials.{name}: transmittance" for name in sorted(opaque)]
-    return scene.altered(materials=scene.materials | opaque), left_out
+    return scene.altered(materials={**scene.materials, **opaque}), left_out
 
 
 def _glass(scene: Scene) -> tuple[int, NDArray[np.bool_], NDArray[np.bool_]]:
@@ -214,8 +214,8 @@ def _picture(scene: Scene, size: int, offset: Offset = "mitsuba", media: MediaRu
 def _gates(name: str, scatter: Scatter, fragile: float, unexplained: int, own: bool) -> list[Gate]:
     subject = f"{name} against random paths"
     off = math.nan if scatter.slope is None else abs(scatter.slope + 0.5)
-    falls = "the error falls as 1 / sqrt(N); where we differ from the paths' mean it stops falling"
-    chance = f"a sound picture gives less once in {1.0 / _FALSE_ALARMS:,.0f} scenes; groups of {_GROUP} pixels, Sidak"
+    falls = "the error falls as 1 / sqrt(N); it stops falling where our picture is wrong"
+    chance = f"a correct picture gives less once in {1.0 / _FALSE_ALARMS:,.0f} scenes; groups of {_GROUP} pixels, Sidak"
     few = "the others are judged outside these pixels, so they must stay few"
     walked = "they are left out, so each must have a reason"
     found = [
@@ -224,7 +224,7 @@ def _gates(name: str, scatter: Scatter, fragile: float, unexplained: int, own: b
     ]
     if own:
         found += [
-            Gate("images", subject, "slope of log RMSE, off -1/2", off, "at most", _SLOPE, falls),
+            Gate("images", subject, "distance of the slope of log RMSE from -1/2", off, "at most", _SLOPE, falls),
             Gate("images", subject, "fragile share of the glass", fragile, "at most", _FRAGILE_SHARE, few),
         ]
     return found

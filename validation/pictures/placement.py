@@ -63,13 +63,13 @@ def check(name: str, scene: Scene) -> tuple[dict[str, Any], list[Gate]]:
     record["seconds"] = time.perf_counter() - began
     gates, where = [], f"{name}, objects"
     if vertices:
-        reason = "a file is read and placed as its scene says; Mitsuba is given our meshes"
-        quantity = "vertices off trimesh's, of the radius"
+        reason = "trimesh reads and places the same files; Mitsuba gets our meshes"
+        quantity = "distance of vertices from trimesh's, share of the radius"
         judged: tuple[str, ...] = ("Scene.instances", "load_mesh")
         gates.append(Gate("images", where, quantity, max(vertices), "at most", _VERTICES, reason, judged))
     if normals:
-        reason = "vertex normals are weighted by angles; Mitsuba is given ours"
-        quantity = "vertex normals off trimesh's"
+        reason = "vertex normals are weighted by angles; Mitsuba gets ours"
+        quantity = "distance of vertex normals from trimesh's"
         judged = ("Mesh.vertex_normals", "Mesh.transformed")
         gates.append(Gate("images", where, quantity, max(normals), "at most", _NORMALS, reason, judged))
     return record | {gate.quantity: gate.value for gate in gates}, gates

@@ -77,7 +77,7 @@ def plan_pictures(scene: Scene, effort: PictureEffort) -> Plan:
     """The rungs and comparisons of a scene, and those that it does not need, with reasons."""
     rungs, left_out = ladder.rungs(scene)
     if effort.lower is None:
-        left_out = {rung.name: "climbed on another scene" for rung in rungs[:-1]} | left_out
+        left_out = {rung.name: "another scene has this step" for rung in rungs[:-1]} | left_out
         rungs = rungs[-1:]
     fault = mitsuba_whitted.can_judge(scene)
     tasks = []

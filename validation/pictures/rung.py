@@ -61,8 +61,8 @@ def check_rung(
 ) -> tuple[dict[str, Any], list[Gate]]:
     """Compare one rung under both rules with its references' pictures."""
     subject = f"{name}, {task.rung.name}"
-    reason = "a rung that nobody judges is not passed"
-    found = [Gate("images", subject, "references that judge it", len(task.references), "at least", 1.0, reason)]
+    reason = "a step without a reference proves nothing"
+    found = [Gate("images", subject, "references", len(task.references), "at least", 1.0, reason)]
     comparisons = []
     for reference in task.references:
         radiance, seconds = theirs[task.rung.name, reference.key]
@@ -88,7 +88,7 @@ def _path_gates(against: str, ours: Picture, theirs: Mapping[Any, Any], task: Ru
     """The native integrator records no rays: what it draws otherwise than reference B nobody has explained."""
     path, whitted = (theirs[task.rung.name, key][0] for key in ("path", "whitted"))
     value = float((verdict.differs(ours, path) & verdict.differs(path, whitted)).sum())
-    reason = "reference B draws the same, and the rays of its pixels were walked"
+    reason = "the Whitted reference draws the same scene, and its rays were followed step by step"
     return [Gate("images", against, "pixels that differ without a reason", value, "at most", 0.0, reason)]
 
 

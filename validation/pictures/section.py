@@ -140,9 +140,14 @@ def _check_aovs(
 ) -> tuple[dict[str, Any], list[Gate]]:
     """Compare the camera's rays with those of Mitsuba's own sensor, and then their hits, which Mitsuba has ``made``."""
     shift = mitsuba_camera.largest_distance(scene.camera, max(resolution))
-    limit, reason = job.thresholds.pictures.camera_pixels, "our primary rays are Mitsuba's; both pictures use ours"
+    limit, reason = (
+        job.thresholds.pictures.camera_pixels,
+        "our camera rays are those of Mitsuba's sensor; both pictures use ours",
+    )
     judged = (f"{type(scene.camera).__name__}.rows",)
-    camera = Gate("images", f"{name}, camera", "pixels between rays", shift, "at most", limit, reason, judged)
+    camera = Gate(
+        "images", f"{name}, camera", "distance of camera rays, pixels", shift, "at most", limit, reason, judged
+    )
     theirs, seconds = made
     ours = picture(scene, resolution, "bounded", max_depth=0)
     record, found, off = aovs.compare(name, scene, ours, theirs, job.thresholds.aovs)

@@ -74,10 +74,13 @@ def check_unseen(job: Job) -> tuple[list[dict[str, Any]], list[Gate]]:
 def _gate(row: Row) -> Gate:
     subject = f"{row.subject}, {row.pixels:,} pixels"
     if row.error is None:
-        value, reason = float(row.wrong or 0), "nothing leads there: the surface has no holes, and no air is in between"
-        return Gate("images", subject, "pixels that see what they cannot", value, "at most", 0.0, reason)
-    reason = "Fresnel's shares, plane by plane; 2^-23: stored as float32"
-    return Gate("images", subject, "relative error of what glass passes", row.error, "at most", STORED, reason)
+        value, reason = (
+            float(row.wrong or 0),
+            "no path leads to the sky: the surface has no holes, and no air lies in between",
+        )
+        return Gate("images", subject, "pixels that see the hidden sky", value, "at most", 0.0, reason)
+    reason = "Fresnel's formula at each plane; 2^-23: stored as float32"
+    return Gate("images", subject, "relative error of transmitted light", row.error, "at most", STORED, reason)
 
 
 def unseen(scene: Scene, size: int, **options: Any) -> tuple[int, int]:

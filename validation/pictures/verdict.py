@@ -142,16 +142,18 @@ def gates(subject: str, record: dict[str, Any]) -> list[Gate]:
     found = []
     for rule, counts in record["offsets"].items():
         against, total, left = f"{subject} against whitted, {rule} offset", sum(counts.values()), record["left"][rule]
-        unseen = f"; {left:,} more were not looked at after {SETTLED} faults" if left else ""
-        reason = f"of {total:,} that differ visibly; both trees of rays were walked to where they part{unseen}"
+        unseen = f"; {left:,} more were not examined after {SETTLED} faults" if left else ""
+        reason = (
+            f"of {total:,} that differ visibly; the rays of both renderers were followed to where they diverge{unseen}"
+        )
         found.append(_none(against, "pixels that differ without a reason", counts["unexplained"], reason))
-        reason = f"of {total:,} that differ visibly: a hit against exact arithmetic, or a picture against its own rays"
-        found.append(_none(against, "pixels in which ours is wrong", counts["ours wrong"], reason))
+        reason = f"of {total:,} that differ visibly: our hit contradicts exact arithmetic, or our picture its own rays"
+        found.append(_none(against, "pixels in which our renderer is wrong", counts["ours wrong"], reason))
     sample, media = record["sample"], record["media"]
-    reason = f"of {sample['pixels']} that agree: each step of their rays is ours but for float32's rounding"
-    found.append(_none(subject, "pixels whose rays take other steps", sample["red"], reason))
-    reason = f"of {media['judged']}: the stack of bodies and the laws of optics, written a second time"
-    found.append(_none(subject, "pixels against the rule for media", len(media["wrong"]), reason))
+    reason = f"of {sample['pixels']} that agree: each step of their rays agrees within float32's rounding"
+    found.append(_none(subject, "pixels whose rays differ at some step", sample["red"], reason))
+    reason = f"of {media['judged']}: a second implementation of the stack of media and of optics"
+    found.append(_none(subject, "pixels that break the rule for media", len(media["wrong"]), reason))
     return found
 
 

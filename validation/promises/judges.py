@@ -10,7 +10,7 @@ from validation.gates import Gate
 from validation.promises.names import public_names
 
 ROOT = Path(__file__).resolve().parents[2]
-_COVERED = "what nobody judges may be broken unseen"
+_COVERED = "a public name without a test may break unnoticed"
 _KNOWN = "such a name is misspelled or was removed"
 _MARKER = "pytest.mark.judges"
 
@@ -29,8 +29,8 @@ def check_names(gates: Sequence[Gate], left_out: Iterable[str], root: Path = ROO
     missing = [row["name"] for row in rows if not (row["tests"] or row["gates"])]
     unknown = sorted({*tests, *sections}.difference(names))
     found = [
-        Gate("promises", "public names", "without a judge", len(missing), "at most", 0.0, _COVERED),
-        Gate("promises", "public names", "judged, and not public", len(unknown), "at most", 0.0, _KNOWN),
+        Gate("promises", "public names", "public names without a test or gate", len(missing), "at most", 0.0, _COVERED),
+        Gate("promises", "public names", "tested names that are not public", len(unknown), "at most", 0.0, _KNOWN),
     ]
     return {"rows": rows, "unknown": unknown}, found
 

@@ -134,7 +134,7 @@ PICTURES = {
     "boxes shown": Check(lambda: check_openings(_random(), _OPENED), ()),
 }
 _CHECKS = {**HITS, **QUERIES, **PICTURES}
-_REASON = "a promise holds each time that it is asked"
+_REASON = "a promise holds in every check"
 
 
 def steps(job: Job) -> int:
@@ -173,6 +173,6 @@ def _step(name: str) -> str:
 def gates(rows: Rows) -> list[Gate]:
     """A gate for each row."""
     return [
-        Gate("promises", row["promise"], "times broken", row["broken"], "at most", 0.0, _REASON, row["judged"])
+        Gate("promises", row["promise"], "broken checks", row["broken"], "at most", 0.0, _REASON, row["judged"])
         for row in rows
     ]

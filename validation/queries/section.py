@@ -30,7 +30,7 @@ class QueryEffort(NamedTuple):
 
 QUICK = QueryEffort(200_000, 60_000, 400, 60, 60, 4)
 FULL = QueryEffort(10_080_000, 1_008_000, 4_000, 400, 500, 24)
-_REASON = "exact: whole numbers, or rational arithmetic"
+_REASON = "exact: integer or rational arithmetic"
 _DISTANCE = (
     f"within {ULPS} ulp of the exact distance, nearer than 2^-64 of the reach 2^-90 of it; 0 on the surface only"
 )

@@ -104,9 +104,11 @@ def compare(metrics: Mapping[str, Any], baseline: Mapping[str, Any] | None) -> d
     if metrics["quick"]:
         return {"absent": "Quick runs use fewer rays and smaller pictures than the baseline and are not compared."}
     if not metrics["own"]:
-        return {"absent": "The baseline is of the suite's own scenes and meshes; this run judged files given to it."}
+        return {"absent": "The baseline has the suite's own scenes and meshes; this run judged files given to it."}
     if baseline is None:
-        return {"absent": "There is none yet. After a whole run, python -m validation --write-baseline makes one."}
+        return {
+            "absent": "There is no baseline yet. After a whole run, python -m validation --write-baseline makes one."
+        }
     now = _summary(metrics)
     ran = tuple(now["seconds"])
     before = {name: gate for name, gate in baseline["gates"].items() if name.split(": ", 1)[0] in ran}

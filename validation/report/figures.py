@@ -21,9 +21,8 @@ def _error_figure(name: str, sweep: Mapping[str, Any]) -> dict[str, str]:
     wrong = [Series(shown, x, [p[kernel]["wrong_share"] for p in points]) for kernel, shown in _NAMES.items()]
     panels = [Panel(errors, "largest relative error of t", roundoffs=True), Panel(wrong, "wrong", share=True)]
     title = (
-        f"Error against {name}: the largest of {points[0]['rays']} rays at each point, and the share with a wrong "
-        f"verdict (missed, falsely hit, or another face). An error of 0 is drawn at {FLOOR:.0e}; a point is left out "
-        "where nothing was hit."
+        f"Error against {name}: the largest of {points[0]['rays']} rays at each point, and the share of wrong answers "
+        f"(missed, falsely hit, or another face). An error of 0 is drawn at {FLOOR:.0e}."
     )
     return {"title": title, "svg": draw(panels, x_label=sweep["label"], title=f"Error of t against {name}")}
 
@@ -34,8 +33,8 @@ def _leak_figure(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     floor = 0.5e6 / max(row["rays"] for row in rows)
     series = [Series(s, x, [1e6 * row[k] / row["rays"] or floor for row in rows]) for k, s in _NAMES.items()]
     title = (
-        f"Leaks from inside icospheres: of {rows[0]['rays']:,} rays a mesh, half aimed at edges and half at vertices. "
-        f"No leak at all is drawn at {floor:.3g} a million, half a ray."
+        f"Leaks from inside icospheres, {rows[0]['rays']:,} rays a mesh, half at edges and half at vertices. No leak "
+        f"is drawn at {floor:.3g} a million, half a ray."
     )
     svg = loglog(series, x_label="faces", y_label="leaks per million rays", title="Leaks against mesh size")
     return {"title": title, "svg": svg}
@@ -48,11 +47,10 @@ def studies_figures(record: Mapping[str, Any]) -> list[dict[str, str]]:
     series += [Series(f"{c['subject']}, patches", patches, c["patches"]) for c in curves]
     first = curves[0]
     chance = [first["rms"][0] * (n / first["counts"][0]) ** -0.5 for n in first["counts"]]
-    series.append(Series("as by chance, N^-0.50", first["counts"], chance, PLAIN))
+    series.append(Series("random, N^-0.50", first["counts"], chance, PLAIN))
     title = (
-        "Root mean square error of the sky view factor over the floor of an endless street, against its closed form, "
-        "by the number of directions: even lattices, the patches of Tregenza (145) and Reinhart (577), and the slope "
-        "that random directions have."
+        "RMS error of the sky view factor over the floor of an endless street by the number of directions: even "
+        "lattices, the patches of Tregenza (145) and Reinhart (577), and the slope of random directions."
     )
     shown = draw([Panel(series, "error of the share")], x_label="directions", title="Studies: error against directions")
     return [{"title": title, "svg": shown}]

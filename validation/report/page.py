@@ -4,7 +4,7 @@ import base64
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -20,16 +20,25 @@ FIGURES: dict[str, Callable[..., Any]] = {
     "studies_figures": figures.studies_figures,
 }
 
-# The sections in the page's order: title and template, which reads the section's record as m.<section>.
+
+class Partial(NamedTuple):
+    """A section of the page: its title, what it does in one line, and the template of its record m.<section>."""
+
+    title: str
+    line: str
+    template: str
+
+
+# The sections in the page's order.
 PARTIALS = {
-    "images": ("Pictures", "pictures.html"),
-    "hits": ("Hits", "hits.html"),
-    "queries": ("Queries", "queries.html"),
-    "studies": ("Studies", "studies.html"),
-    "promises": ("Promises", "promises.html"),
-    "stability": ("Stability", "stability.html"),
-    "random": ("Scenes that nobody chose", "random.html"),
-    "efficiency": ("Efficiency", "efficiency.html"),
+    "images": Partial("Pictures", "beside Mitsuba's, one effect of light at a time", "pictures.html"),
+    "hits": Partial("Hits", "beside Embree, libigl, Mitsuba and trimesh, judged by exact arithmetic", "hits.html"),
+    "queries": Partial("Queries", "inside, distance, all hits, and the drop-in for trimesh", "queries.html"),
+    "studies": Partial("Studies", "sky view factors, hours of sun, ambient occlusion", "studies.html"),
+    "stability": Partial("Stability", "extreme cases, watertightness, error of the hit distance", "stability.html"),
+    "random": Partial("Random input", "scenes and meshes drawn from a seed", "random.html"),
+    "efficiency": Partial("Efficiency", "error and run time beside other tracers; no gates", "efficiency.html"),
+    "promises": Partial("Promises", "rules of the documentation, each checked on its own", "promises.html"),
 }
 
 
@@ -41,11 +50,9 @@ def page(metrics: dict[str, Any], pictures: Path) -> str:
     shown = PictureClasses(pictures)
     environment.filters["number"] = number
     environment.globals |= FIGURES
-    environment.globals["picture"] = lambda name: _data_uri(pictures / name)
     environment.globals["shown"] = shown
     environment.globals["failed_files"] = failed_files
-    environment.globals["titles"] = {name: title for name, (title, _) in PARTIALS.items()}
-    environment.globals["partials"] = {name: template for name, (_, template) in PARTIALS.items()}
+    environment.globals["partials"] = PARTIALS
     return environment.get_template("report.html").render(m=metrics)
 
 

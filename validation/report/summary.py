@@ -34,27 +34,30 @@ def matrix(records: Mapping[str, Record], gates: Sequence[Record]) -> list[dict[
     return rows
 
 
-def facts(rows: Sequence[Record], gates: Sequence[Record], defects: Record | None) -> list[dict[str, Any]]:
-    """Up to six numbers for the head of the report; those whose gates did not run are left out."""
-    wrong = [gate for gate in gates if "on which we are wrong" in gate["quantity"]]
+def facts(records: Mapping[str, Record], gates: Sequence[Record], defects: Record | None) -> list[dict[str, Any]]:
+    """Up to five numbers for the head of the report; those whose gates did not run are left out."""
+    wrong = [gate for gate in gates if (gate["section"], gate["quantity"]) == ("hits", "wrong hits")]
     leaks = [gate for gate in gates if gate["quantity"] == "leaks"]
-    cases = [gate for gate in gates if gate["quantity"] == "holds"]
+    answers = [gate for gate in gates if gate["section"] == "queries"]
     similar = [gate["value"] for gate in gates if gate["quantity"] == "ssim" and gate["value"] is not None]
+    cases = [gate for gate in gates if gate["quantity"] == "holds"]
     found: list[tuple[float | None, str]] = []
     if wrong:
-        found.append((_sum(wrong), f"rays on which we are wrong, over {len(wrong)} families and samples"))
+        meshes = records["hits"].get("meshes", ())
+        rays = sum(family["rays"] for mesh in meshes for family in mesh["families"])
+        found.append((_sum(wrong), f"wrong hits in {rays:,} rays"))
     if leaks:
         found.append((_sum(leaks), f"leaks through closed meshes, in {len(leaks)} sets of rays"))
+    if answers:
+        asked = sum(row["asked"] for row in records["queries"].get("rows", ()))
+        found.append((_sum(answers), f"wrong answers in {asked:,} queries: inside, distance, all hits"))
     if similar:
-        found.append((min(similar), f"lowest SSIM of {len(similar)} comparisons with a reference"))
+        found.append((min(similar), f"lowest SSIM beside Mitsuba, of {len(similar)} comparisons"))
     if cases:
         found.append((sum(gate["passed"] for gate in cases), f"of {len(cases)} extreme cases hold"))
     if defects is not None:
         found.append((defects["caught"], f"of {len(defects['defects'])} seeded defects caught"))
-    names = {name for row in rows for name in row["references"]}
-    if names:
-        found.append((len(names), "references and judges asked"))
-    return [{"value": value, "label": label} for value, label in found]
+    return [{"value": value, "label": label} for value, label in found[:5]]
 
 
 def _sum(gates: Sequence[Record]) -> float | None:

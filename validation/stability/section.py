@@ -13,7 +13,7 @@ from validation.stability.cases.case import ExtremeCase
 CASES = (*hits.CASES, *shading.CASES)
 
 # The judges of this section. Each works within a case or sweep, so its seconds are not measured apart.
-JUDGES = ("exact arithmetic", "analytic", "Embree robust", "Embree default", "brute force")
+JUDGES = ("exact arithmetic", "closed form", "Embree robust", "Embree default", "brute force")
 
 
 def steps(job: Job) -> int:

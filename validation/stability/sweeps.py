@@ -185,7 +185,7 @@ def judge(name: str, points: list[Point]) -> list[Gate]:
     subject = f"error against {name}, {rays:,} rays"
     aimed, derived = "no ray is aimed within rounding of an edge", "the bound follows from the kernel's arithmetic"
     return [
-        Gate("stability", subject, "wrong verdicts", wrong, "at most", 0.0, aimed),
+        Gate("stability", subject, "wrong hits", wrong, "at most", 0.0, aimed),
         Gate("stability", subject, "t beyond its bound", beyond, "at most", 0.0, derived),
     ]
 

@@ -56,7 +56,7 @@ def _bits(octree: Octree, points: Floats, normals: Floats, *, leaving: NDArray[n
 
 
 def moved_to_utm() -> Asked:
-    """Mesh and points moved by the same whole numbers have the same bits."""
+    """Moving mesh and points by the same integers changes no bit."""
     asked, wrong = 0, 0
     for mesh in (town(), terrain()):
         points, normals, faces = _within(mesh), mesh.face_normals(), np.arange(len(mesh.faces))
@@ -70,7 +70,7 @@ def moved_to_utm() -> Asked:
 
 
 def threads_order_and_company() -> Asked:
-    """A point's answer is the same for any threads, in any order, alone and among others."""
+    """A point's answer does not depend on threads, order or batch."""
     mesh, rng = town(), np.random.default_rng(_SEED)
     octree, (points, normals, faces) = Octree.from_mesh(mesh), face_points(mesh)
     whole = sky_view_factor(octree, points, normals, leaving=faces, threads=1)
@@ -85,7 +85,7 @@ def threads_order_and_company() -> Asked:
 
 
 def no_light_through_touching_walls() -> Asked:
-    """Within houses wall to wall, directions to their seams, corners and all around are hidden."""
+    """Inside houses that touch, all directions are hidden, also those to seams and corners."""
     mesh, octree = touching(), Octree.from_mesh(touching())
     rng = np.random.default_rng(_SEED)
     points = rng.integers(1, 2**12, (40, 3)) / 2.0**12 * [2.0, 2.0, 2.0]
@@ -102,7 +102,7 @@ def no_light_through_touching_walls() -> Asked:
 
 
 def no_shade_among_faces_of_a_plane() -> Asked:
-    """Roofs that touch, and many faces of one plane, level or turned, shade each other nowhere."""
+    """Faces of one plane do not shade each other, level or turned."""
     mesh = touching()
     roofs = np.flatnonzero(mesh.face_normals()[:, 2] == 1.0)
     found = [sky_view_factor(Octree.from_mesh(mesh), _within(mesh)[roofs], [0, 0, 1], leaving=roofs) == 1.0]
@@ -137,7 +137,7 @@ def dark_inside_bodies() -> Asked:
 
 
 def hours_behind_walls() -> Asked:
-    """Hours on a street's floor, counted by the angles to its walls, for suns of different weight."""
+    """Hours of sun on a street's floor follow from the angles to its walls, also for weighted suns."""
     width, depth = 2.0, 1.0
     octree = Octree.from_mesh(street(width, depth))
     angle = np.radians(np.arange(1, 180) + 0.5)
@@ -169,7 +169,7 @@ def weights_and_distances_of_directions() -> Asked:
 
 
 def faces_that_an_eye_sees() -> Asked:
-    """Of a ball, which hides none of its faces but by facing away: those whose plane the eye is above."""
+    """Of a ball, an eye sees exactly the faces whose plane it is above."""
     mesh = icosphere(4)
     octree, wrong = Octree.from_mesh(mesh), 0
     eyes = 3.0 * fibonacci_sphere(12).directions
@@ -183,7 +183,7 @@ def faces_that_an_eye_sees() -> Asked:
 
 
 def clouds_and_depths() -> Asked:
-    """Distances of a scan and a depth map are those of exact hits, within 4 ulp of t, and none where none is."""
+    """Distances of a scan and a depth map equal those of exact hits within 4 ulp, and misses agree."""
     mesh = bodies()["balls"]
     octree, origin = Octree.from_mesh(mesh), np.array([0.25, -4.0, 0.5])
     ways = fibonacci_sphere(600).directions * np.linspace(0.25, 8.0, 600)[:, None]
@@ -202,8 +202,8 @@ def clouds_and_depths() -> Asked:
 
 
 def clouds_from_a_roof() -> Asked:
-    """A scanner on a roof, at its edge and on its corner meets the roof at once where it looks through it, and else
-    what exact arithmetic says.
+    """A scanner on a roof, at its edge or corner hits the roof at once where it looks through it; elsewhere exact
+    arithmetic decides.
     """
     mesh = town(2, 3)
     octree, surface, ways = Octree.from_mesh(mesh), Surface(mesh.vertices, mesh.faces), fibonacci_sphere(300).directions
@@ -227,7 +227,7 @@ def clouds_from_a_roof() -> Asked:
 
 
 def places_of_a_grid() -> Asked:
-    """Points that a grid wrote to a file, read from there and on no face, have the grid's own bits."""
+    """Grid points written to a file and read back have the grid's own bits."""
     found = []
     for mesh, spacing in ((town(), 0.11), (terrain(), 0.02), (touching(), 0.125)):
         octree, study = Octree.from_mesh(mesh), Study("sky", {})
@@ -241,7 +241,7 @@ def places_of_a_grid() -> Asked:
 
 
 def edges_from_both_sides() -> Asked:
-    """Points of a tetrahedron's edges see its middle, each other, and what is before one of their two faces."""
+    """Points on a tetrahedron's edges see its centre, each other, and what lies in front of either of their faces."""
     rng = np.random.default_rng(_SEED)
     mesh = tetrahedron()
     corners, faces = mesh.vertices, mesh.faces

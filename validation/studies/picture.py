@@ -24,8 +24,9 @@ def write(path: Path) -> dict[str, Any]:
     values = np.full(len(mesh.faces), np.nan)
     values[faces] = sky_view_factor(Octree.from_mesh(mesh), points, normals, leaving=faces)
     thing = SceneObject(mesh=mesh, material="grey", normals="flat")
-    scene = Scene(camera=from_above(mesh, _SIZE), materials={"grey": Phong()}, objects=[thing], ambient=1)
-    size = (2 * _SIZE[0], 2 * _SIZE[1])
+    shown = drawing.map_size(_SIZE)
+    scene = Scene(camera=from_above(mesh, shown), materials={"grey": Phong()}, objects=[thing], ambient=1)
+    size = (drawing.FINER * shown[0], drawing.FINER * shown[1])
     image = render(scene, resolution=size, samples=1, max_depth=0, planes=("face", "normal"))
-    drawing.write_png(path, drawing.draw(image, mesh, values, "sky view factor"))
+    drawing.write_png(path, drawing.draw(image, mesh, values, "sky view factor", drawing.legend_rows(_SIZE[1])))
     return {"name": path.name, "faces": len(mesh.faces), "mean": float(np.nanmean(values))}

@@ -11,12 +11,14 @@ from validation.studies import bits, bodies, corners, forms, holds, picture
 # Points and directions of each mesh whose bits are judged. All faces of most meshes: only points that lie as dense as
 # faces are traced together.
 _QUICK, _FULL = (6_000, 64), (6_000, 577)
-JUDGES = ("closed forms", "Embree robust", "exact arithmetic")
-_BITS = "exact: of each bit on which Embree differs, and of a sample of the others, exact arithmetic says who is right"
-_BOUND = "the bound: as if every patch along the boundary were wrong by half of its weight, all to one side"
-_SLOPE = "chance alone has -1/2; an even lattice does better"
-_NAMED = "exact: the normal says in which region rays start, and which face is named changes nothing"
-_HOLDS = "exact: it must hold of every answer"
+JUDGES = ("closed form", "Embree robust", "exact arithmetic")
+_BITS = (
+    "exact: of each bit on which Embree differs, and of a sample of the others, exact arithmetic decides who is right"
+)
+_BOUND = "the bound: each patch along the boundary wrong by half of its weight, all to one side"
+_SLOPE = "random directions give -1/2; an even lattice does better"
+_NAMED = "exact: the normal decides on which side rays start, whichever face is named"
+_HOLDS = "exact: it must hold for every answer"
 PICTURE = "studies-town.png"
 
 
@@ -44,7 +46,7 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
         *(Gate("studies", row["subject"], "wrong bits", float(row["wrong"]), "at most", 0.0, _BITS,
                ("studies.occlusion",))
           for row in (*bit_rows, *corner_rows)),
-        *(Gate("studies", row["subject"], "points with another sky where their face is named", float(row["unlike"]),
+        *(Gate("studies", row["subject"], "points whose sky changes when their face is named", float(row["unlike"]),
                "at most", 0.0, _NAMED, ("studies.sky_view_factor",)) for row in corner_rows),
         *(Gate("studies", row["subject"], "wrong answers", float(row["wrong"]), "at most", 0.0, _HOLDS, row["judged"])
           for row in held),

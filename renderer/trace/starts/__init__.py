@@ -1,1 +1,1 @@
-"""Rays that start on the surface: the exact start, the faces that hold it, and what stops a ray there."""
+"""Rays that start on the surface: the exact start, the faces that contain it, and whether one stops the ray there."""

@@ -1,4 +1,4 @@
-"""The exact start of a ray: a corner of its face, and the way from there as pairs of float64.
+"""The exact start of a ray: a corner of its face and an offset in pairs of float64.
 
 So the start is known to 2^-100 of the face's size, however far the face is from the origin of coordinates.
 """
@@ -45,7 +45,7 @@ class Anchor(NamedTuple):
 
 @kernel
 def anchor_of(start):
-    """The exact start: the point of the barycentrics given, or the point of the face that is nearest to the one given.
+    """The exact start: the point of the given barycentrics, or the point of the face nearest to the given one.
 
     Barycentrics below 0, by rounding, count as 0; the two others are scaled to add up to 1.
     """
@@ -59,7 +59,7 @@ def anchor_of(start):
 
 @kernel
 def rounded(anchor):
-    """The anchor as float64, each coordinate rounded by little of itself."""
+    """The anchor as float64; each coordinate has a small relative error."""
     (x, y, z), (bx, by, bz), unit = anchor.way, anchor.base, anchor.unit
     return _nearest_float(bx, x, unit), _nearest_float(by, y, unit), _nearest_float(bz, z, unit)
 
@@ -72,7 +72,7 @@ def _nearest_float(base, way, unit):
 
 @kernel
 def from_anchor(anchor, p, factor):
-    """The way from an anchor to a point, times a power of two, as pairs."""
+    """The vector from an anchor to a point, times a power of two, as pairs."""
     a, share = scaled_difference(p, anchor.base, factor), anchor.unit * factor
     (x, y, z), (a0, a1, a2) = anchor.way, a
     return (
@@ -106,7 +106,7 @@ def _atone_of(corners, k, unit):
 
 @kernel
 def _along(corners, i, j, share, unit):
-    """The point of the side from corner i to corner j, ``share`` of it from i; at its ends the corner itself."""
+    """The point of the side from corner i to corner j at ``share`` from i; at the ends exactly the corner."""
     if share[0] <= _TINY:
         return _atone_of(corners, i, unit)
     rest = minus((1.0, 0.0), share)
@@ -140,14 +140,14 @@ def _at_weights(corners, u, v, unit):
 
 @kernel
 def _mean(a, b, c, s, t, unit):
-    """s (b - a) + t (c - a), in a unit."""
+    """s (b - a) + t (c - a), scaled by a unit."""
     one, other = scaled_difference(b, a, 1.0 / unit), scaled_difference(c, a, 1.0 / unit)
     return _sum(_times(one, s), _times(other, t))
 
 
 @kernel
 def _nearest(corners, o, unit):
-    """The point of a face that is nearest to o. Source: Ericson, Real-Time Collision Detection, 2005, section 5.1.5."""
+    """The point of a face nearest to o. Source: Ericson, Real-Time Collision Detection, 2005, section 5.1.5."""
     p0, p1, p2 = corners
     one, other = scaled_difference(p1, p0, 1.0 / unit), scaled_difference(p2, p0, 1.0 / unit)
     q = scaled_difference(o, p0, 1.0 / unit)
@@ -178,13 +178,13 @@ def _nearest(corners, o, unit):
 
 @inlined
 def _is_beyond(a, b, c, d):
-    """Whether a b >= c d of pairs, or nearly so: a weight, which is c d - a b, is 0 or less."""
+    """Whether a b >= c d for pairs, up to rounding: then a weight, c d - a b, is 0 or less."""
     one, other = product(a, b), product(c, d)
     return minus(other, one)[0] <= _TINY * (abs(one[0]) + abs(other[0]))
 
 
 @kernel
 def far_from(anchor, o):
-    """How far a point is from an anchor along the axis where it is farthest."""
+    """The distance of a point from an anchor along the axis where it is largest."""
     way = heads(from_anchor(anchor, o, 1.0))
     return largest_component(way)

@@ -1,6 +1,6 @@
-"""The cones at a start cut into arcs that meet at their ends only, where others touch or cross them in their midst.
+"""Cuts the cones at a start into arcs that meet only at their ends, where others touch or cross them.
 
-Such is the foot of a wall within a floor. Arcs are holders too, behind those of the cones.
+The foot of a wall on a floor is an example. Arcs are holders too, listed behind those of the cones.
 """
 
 import numpy as np
@@ -42,8 +42,8 @@ _PLACES = 4
 
 @kernel
 def arcs_of(tree, anchor, holders, count):
-    """The arcs of some cones, as ``Holders``, their number and that of their nodes: the cones themselves where these
-    meet at their ends only.
+    """The arcs of some cones as ``Holders``, their number, and that of their nodes; the cones themselves if they
+    already meet only at their ends.
     """
     number = _cut(tree, anchor, holders, count)
     if number == 0:
@@ -54,7 +54,7 @@ def arcs_of(tree, anchor, holders, count):
 
 @kernel
 def _cut(tree, anchor, holders, count):
-    """List the arcs behind the cones; returns their number, 0 where none is cut or there is no room for all."""
+    """List the arcs behind the cones. Returns their number, 0 if none is cut or there is no room for all."""
     # rule: foot-of-wall
     if not _are_cut(tree, anchor, holders, count):
         return 0
@@ -72,7 +72,7 @@ def _cut(tree, anchor, holders, count):
 
 @kernel
 def _are_cut(tree, anchor, holders, count):
-    """Whether any cone is touched or crossed in its midst."""
+    """Whether any cone is touched or crossed between its ends."""
     for i in range(count):
         own = cone_of(tree, anchor, holders, i)
         for j in range(count):
@@ -87,7 +87,7 @@ def _are_cut(tree, anchor, holders, count):
 
 @kernel
 def _touch(own, other, k):
-    """Whether a cone has its k-th place in the plane of another one, and that direction."""
+    """Whether the k-th place of a cone lies in the plane of another cone, and that direction."""
     second = other.second if other.kind == 2 else negative(other.first)
     ends = lean_sign(own.face, other.first), lean_sign(own.face, second)
     if k < 2:
@@ -114,7 +114,7 @@ def _scaled(a, factor):
 
 @kernel
 def _add_whole(tree, anchor, holders, i, end):
-    """Add the arcs of the i-th cone, each less than half a turn; returns the end of the list, 0 without room."""
+    """Add the arcs of the i-th cone, each less than half a turn. Returns the end of the list, 0 without room."""
     if end + 4 > MOST_HOLDERS:
         return 0
     own = cone_of(tree, anchor, holders, i)
@@ -138,7 +138,7 @@ def _add_whole(tree, anchor, holders, i, end):
 
 @kernel
 def _cut_by(tree, anchor, holders, i, j, begin, end):
-    """Cut the arcs begin:end of the i-th cone where the j-th one touches or crosses them; returns their end, 0 without
+    """Cut the arcs begin:end of the i-th cone where the j-th one touches or crosses them. Returns their end, 0 without
     room.
     """
     own, other = cone_of(tree, anchor, holders, i), cone_of(tree, anchor, holders, j)
@@ -159,7 +159,7 @@ def _cut_by(tree, anchor, holders, i, j, begin, end):
 
 @kernel
 def _name_ends(arcs, count):
-    """Name the ends of all arcs: two are one node where they are one direction. Returns the number of nodes."""
+    """Name the ends of all arcs; two ends in one direction are one node. Returns the number of nodes."""
     nodes = 0
     for k in range(count):
         for end in range(2):

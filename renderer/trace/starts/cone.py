@@ -1,8 +1,8 @@
-"""The faces that hold a start, as cones of directions around it, and the parities of the paths that cross them.
+"""The faces that contain a start, as cones of directions, and the parities of the paths that cross them.
 
-Near the start a face is a plane, a half-plane or a sector, as the start is inside it, on an edge or on a corner. On the
-sphere of directions its cone is an arc of a great circle. A path is two such arcs of our own: from a reference to a
-direction in general position, the hub, and from there on.
+Seen from the start, a face is a plane, a half-plane or a sector: the start is inside it, on an edge or on a corner. On
+the sphere of directions its cone is an arc of a great circle. A path is two further such arcs: from a reference to a
+direction in general position, the hub, and from there to the target.
 """
 
 from typing import Any, NamedTuple
@@ -68,7 +68,7 @@ def put_node(holders, k, word, value):
 
 @kernel
 def add_holder(holders, count, place, face, zeros):
-    """Add a face to the holders, unless there is no room; returns their number."""
+    """Add a face to the holders, if there is room. Returns their number."""
     if count >= MOST_HOLDERS:
         return count
     put_holder(holders, count, PLACE, place)
@@ -80,7 +80,7 @@ def add_holder(holders, count, place, face, zeros):
 
 @inlined
 def put_way(holders, k, word, a):
-    """Write a way, a vector of pairs, to a holder."""
+    """Write a vector of pairs to a holder."""
     for i in range(3):
         store(holders.holders, k * HOLDER_WORDS + word + 2 * i, np.float64(a[i][0]).view(np.int64))
         store(holders.holders, k * HOLDER_WORDS + word + 2 * i + 1, np.float64(a[i][1]).view(np.int64))
@@ -93,7 +93,7 @@ def _number(holders, k, word):
 
 @inlined
 def way_of(holders, k, word):
-    """A way of a holder."""
+    """A vector of pairs of a holder."""
     return (
         (_number(holders, k, word), _number(holders, k, word + 1)),
         (_number(holders, k, word + 2), _number(holders, k, word + 3)),
@@ -103,7 +103,7 @@ def way_of(holders, k, word):
 
 @kernel
 def put_arc(holders, k, i, first, second):
-    """Let the k-th holder be an arc of the i-th one's cone."""
+    """Make the k-th holder an arc of the i-th one's cone."""
     for word in (PLACE, NUMBER, ZEROS):
         put_holder(holders, k, word, holder(holders, i, word))
     put_holder(holders, k, _IS_ARC, 1)
@@ -113,13 +113,13 @@ def put_arc(holders, k, i, first, second):
 
 @inlined
 def _corner_of(zeros):
-    """Of a start on a corner, that corner: the one whose weight is not 0."""
+    """For a start on a corner, that corner: the one whose weight is not 0."""
     return 0 if zeros & 1 == 0 else (1 if zeros & 2 == 0 else 2)
 
 
 @inlined
 def _opposite(zeros):
-    """Of a start on an edge, the corner opposite to it: the one whose weight is 0."""
+    """For a start on an edge, the corner opposite to it: the one whose weight is 0."""
     return 0 if zeros & 1 != 0 else (1 if zeros & 2 != 0 else 2)
 
 
@@ -135,8 +135,8 @@ def _after(k):
 
 @kernel
 def name_nodes(tree, anchor, holders, count):
-    """Name the ends of all cones: two ends are one node where they are one corner, and ends that no other cone has
-    where they lie in one direction. Returns the number of nodes.
+    """Name the ends of all cones. Two ends are one node if they are one corner, or if no other cone has them and they
+    lie in one direction. Returns the number of nodes.
     """
     nodes = 0
     for k in range(count):
@@ -156,7 +156,7 @@ def name_nodes(tree, anchor, holders, count):
 
 @kernel
 def _named(tree, holders, nodes, place):
-    """The node of a corner, a new one if there is none; and the number of nodes. PARITY counts the ends there."""
+    """The node of a corner, a new one if there is none, and the number of nodes. PARITY counts the ends there."""
     p = corner(tree, place)
     for k in range(nodes):
         q = corner(tree, node(holders, k, NODE_PLACE))
@@ -170,7 +170,7 @@ def _named(tree, holders, nodes, place):
 
 @kernel
 def _join_ends(tree, anchor, holders, count, nodes):
-    """Let ends that one cone alone has be one node where they lie in one direction, as where edges meet an edge."""
+    """Join ends that only one cone has, if they lie in one direction, as where edges touch an edge."""
     for i in range(nodes):
         for j in range(i):
             alone = node(holders, i, PARITY) == 1 and node(holders, j, PARITY) == 1
@@ -188,14 +188,14 @@ def _node_corner(tree, holders, k):
 
 @kernel
 def _one_direction(anchor, p, q):
-    """Whether two points are in one direction from the anchor."""
+    """Whether two points lie in one direction from the anchor."""
     a, b = _unit_way(anchor, p), _unit_way(anchor, q)
     return is_one_way(a, b, 2.0**-86 + 2.0**-94 * anchor.unit * (1.0 / _size(anchor, p) + 1.0 / _size(anchor, q)))
 
 
 @inlined
 def is_one_way(a, b, error):
-    """Whether two ways, of largest component 1 to 2, are one direction but for an error."""
+    """Whether two vectors, of largest component 1 to 2, have one direction up to rounding."""
     return largest_component(heads(cross_pairs(a, b))) <= error and dot_pairs(a, b)[0] > 0.0
 
 
@@ -206,16 +206,15 @@ def _size(anchor, p):
 
 @inlined
 def _unit_way(anchor, p):
-    """The way to a point that is not the anchor, its largest component from 1 to 2."""
+    """The vector to a point other than the anchor, scaled to a largest component from 1 to 2."""
     return from_anchor(anchor, p, 1.0 / _size(anchor, p))
 
 
 class Cone(NamedTuple):
-    """A holder as a cone: its face from the anchor, and two vectors of pairs in its plane, exact differences of
-    corners.
+    """A holder as a cone: its face seen from the anchor, and two vectors in its plane, exact differences of corners.
 
-    A plane holds all directions x of its own, a half-plane those with normal . (first x x) >= 0, and a sector those
-    with normal . (x x second) >= 0 as well.
+    A plane contains all its directions x, a half-plane those with normal . (first x x) >= 0, and a sector only those of
+    these with normal . (x x second) >= 0.
 
     kind  the number of corners of weight 0: 0 a plane, 1 a half-plane, 2 a sector
     """
@@ -250,7 +249,7 @@ def _unit(a, b):
 
 @kernel
 def middle_of(cone, attempt):
-    """A direction within a cone, as pairs; another one with each attempt."""
+    """A direction inside a cone, as pairs; a different one for each attempt."""
     share, other = 1.0 + (attempt & 3), 1.0 + (attempt >> 2)
     if cone.kind == 1:
         return _mixed(cone.first, cone.second, share - 2.5, other)
@@ -270,7 +269,7 @@ def _mixed(a, b, s, t):
 
 @kernel
 def within_cone(cone, x):
-    """Where a direction of pairs in the plane of a cone is: 1 inside, 0 on its outline, -1 outside."""
+    """The place of a direction in the plane of a cone: 1 inside, 0 on its outline, -1 outside."""
     if cone.kind == 0:
         return 1
     s = turn_sign(cone.face, cone.first, x)
@@ -284,8 +283,8 @@ def within_cone(cone, x):
 
 @kernel
 def crosses(cone, x, y, side):
-    """The parity of the path from x to y, both pairs: UNKNOWN where it meets the outline or x is in the cone's plane;
-    FREE where y is on the cone. ``side`` is the sign of normal . y.
+    """The parity of the path from x to y, both pairs: UNKNOWN if it touches the outline or x is in the cone's plane;
+    FREE if y is on the cone. ``side`` is the sign of normal . y.
     """
     start = lean_sign(cone.face, x)
     if start == 0:
@@ -301,7 +300,7 @@ def crosses(cone, x, y, side):
 
 @kernel
 def _passes(cone, x, y, g, h):
-    """``within_cone`` of h x + g y, where the path meets the plane."""
+    """``within_cone`` of h x + g y, where the path crosses the plane."""
     if cone.kind == 0:
         return 1
     s = _mixed_sign(cone.face, cone.first, x, y, g, h)

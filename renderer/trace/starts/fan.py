@@ -1,7 +1,7 @@
-"""The faces around a start as a table of float64: for many directions from one start, whether a face stops them.
+"""The faces around a start as a table of float64: whether one stops a ray, for many directions.
 
-The paths of ``region`` to the start's own region and to the directions share their hub. Crossings are told from scalar
-products; where rounding may have made one of them, ``region`` decides.
+As in ``region``, the paths to the start's own region and to the directions share their hub. Crossings are found from
+scalar products; if rounding could decide one, ``region`` decides.
 """
 
 import numpy as np
@@ -37,19 +37,19 @@ _LEAST = 2.0**-12
 
 @inlined
 def fan_doubles(count):
-    """The float64 of a table of ``count`` faces."""
+    """The number of float64 in a table of ``count`` faces."""
     return FAN_HEAD + _ROW * count
 
 
 @inlined
 def size_of_fan(table):
-    """The float64 of a table."""
+    """The number of float64 in a table."""
     return fan_doubles(np.int64(load(table, _COUNT)))
 
 
 @inlined
 def clear_fan(table):
-    """Let there be no table."""
+    """Mark the table as absent."""
     store(table, _COUNT, 0.0)
 
 
@@ -60,8 +60,8 @@ def has_fan(table):
 
 @kernel
 def write_fan(tree, anchor, holders, count, nodes, k, side, table, room):
-    """Write the table of a start in the region beside the k-th of its holders, on one side of it, if there are ``room``
-    float64 for it.
+    """Write the table of a start in the region beside the k-th of its holders, on one side of it, if it fits in
+    ``room`` float64.
     """
     clear_fan(table)
     if fan_doubles(count) > room:
@@ -77,7 +77,7 @@ def write_fan(tree, anchor, holders, count, nodes, k, side, table, room):
 
 @kernel
 def _write_rows(tree, anchor, holders, count, hub, table):
-    """Write the rows of all faces; returns whether the hub is far from their planes."""
+    """Write the rows of all faces. Returns whether the hub is far from their planes."""
     parity = np.int64(0)
     for j in range(count):
         cone, row = cone_of(tree, anchor, holders, j), offset(table, FAN_HEAD + _ROW * j)
@@ -101,7 +101,7 @@ def _write_rows(tree, anchor, holders, count, hub, table):
 
 @kernel
 def _are_closed(holders, count, nodes):
-    """Whether the cones are one closed fan: two at each node, and no fewer of them make one."""
+    """Whether the cones are one closed fan: two at each node, and no subset of them is one."""
     for j in range(count):
         if holder(holders, j, FIRST_NODE) == NO_NODE:
             return False
@@ -126,7 +126,7 @@ def _are_closed(holders, count, nodes):
 
 @inlined
 def _crosses(row, d, size):
-    """The parity of the path from the hub to d, of largest component ``size``: -1 where rounding may have made it."""
+    """The parity of the path from the hub to d, of largest component ``size``; -1 if rounding could decide it."""
     g, h = load(row, _HUB), dot(three(row, _NORMAL), d)
     if abs(h) <= _ROUNDED * size:
         return -1
@@ -143,7 +143,7 @@ def _crosses(row, d, size):
 
 @kernel
 def stop_of(table, d, holders):
-    """Whether a ray in direction d is stopped at the start of a table: OPEN, STOPPED, or UNSURE by rounding."""
+    """Whether the faces of a table stop a ray in direction d: OPEN, STOPPED, or UNSURE by rounding."""
     count, size, parity = np.int64(load(table, _COUNT)), largest_component(d), np.int64(load(table, _PARITY))
     closed = load(table, _CLOSED) != 0.0
     for j in range(count):

@@ -1,7 +1,7 @@
-"""Faces that coincide where a ray meets the surface: in one plane, but for the rounding of their corners.
+"""Faces that coincide where a ray hits the surface: in one plane up to the rounding of their corners.
 
-Corners that were turned or moved are off by rounding, and so are planes that were one: such faces count as coinciding,
-and the order in which the ray passes them is exact.
+Turned or moved corners are rounded, and so planes that were equal differ. Such faces count as coinciding; the order in
+which the ray crosses them is exact.
 """
 
 from typing import Any, NamedTuple
@@ -24,9 +24,9 @@ from renderer.trace.walk import walk
 NO_MEMBER = -1
 # The share of the largest coordinate by which corners are off: 16 roundings.
 CORNER_ERROR = 2.0**-49
-# Whether a face holds a point is asked so far inside the face that the ray met: at these weights of its corners.
+# A face contains the hit if it contains a point so far inside the face hit, at these weights of its corners.
 _INWARDS, _U, _V = 2.0**-44, 0.3217, 0.4159
-# Of the products of lengths that say on which side of an edge a point is, what is taken for rounding.
+# The share of the products of lengths that decide the side of an edge that counts as rounding.
 _BESIDE = 2.0**-36
 
 
@@ -39,8 +39,8 @@ class Spot(NamedTuple):
 
 
 class Members(NamedTuple):
-    """Faces that coincide where a ray meets one of them, listed in words of ``cone.Holders``: their number, and where
-    the ray is before it passes all of them and after it. Of faces that it passes at once, the highest is last.
+    """Coinciding faces that a ray hits together, listed in words of ``cone.Holders``: their number, and where the ray
+    is before and after it crosses all of them. Of faces crossed at once, the highest is last.
     """
 
     count: int  # type: ignore[assignment]  # tuples have a method of that name
@@ -49,8 +49,8 @@ class Members(NamedTuple):
 
 
 class _SurfacePoint(NamedTuple):
-    """A point that a ray meets: the corners of the face, the barycentrics, the point as rounded, and the direction of
-    the ray, scaled to about 1.
+    """A point hit by a ray: the face's corners, the barycentrics, the point as rounded, and the ray's direction, scaled
+    to about 1.
     """
 
     corners: Any
@@ -69,7 +69,7 @@ def plane_of(corners):
 
 @kernel
 def _is_below(p, q, error):
-    """Whether the corners of q are in the plane of p, whose corners are off by ``error``."""
+    """Whether the corners of q lie in the plane of p, whose corners are off by ``error``."""
     n, side = plane_of(p)
     size, level = length(n), True
     for a in q:
@@ -80,14 +80,14 @@ def _is_below(p, q, error):
 
 @inlined
 def are_level(p, q):
-    """Whether two faces are in one plane, but for the rounding of their corners."""
+    """Whether two faces lie in one plane up to the rounding of their corners."""
     error = CORNER_ERROR * maximum(largest_of_three(*p), largest_of_three(*q))
     return _is_below(p, q, error) and _is_below(q, p, error)
 
 
 @kernel
 def _anchor_at(met, inwards):
-    """The point met, exactly, moved by some share of the way to a point inside the face."""
+    """The exact hit point, moved by some share towards a point inside the face."""
     spot = met.spot
     u, v = spot.u + inwards * (_U - spot.u), spot.v + inwards * (_V - spot.v)
     return anchor_of(Start(met.corners, (u, v, 0.0), spot.face, BARYCENTRIC))
@@ -95,7 +95,7 @@ def _anchor_at(met, inwards):
 
 @kernel
 def _holds_inner_point(tree, place, met):
-    """Whether a face holds the inner point, exactly."""
+    """Whether a face contains the inner point, exactly."""
     face = seen_from(tree, place, _anchor_at(met, _INWARDS))
     return has_area(face) and (
         turn_sign(face, face.a1, face.a2) >= 0
@@ -106,7 +106,7 @@ def _holds_inner_point(tree, place, met):
 
 @inlined
 def _share_axis(p, q):
-    """Whether two faces are in one plane across an axis."""
+    """Whether two faces lie in one plane across an axis."""
     share = False
     for k in range(3):
         x = p[0][k]
@@ -117,7 +117,7 @@ def _share_axis(p, q):
 
 @kernel
 def _passed_at(tree, place, met):
-    """Where the ray passes a member, counted from the point met: negative before it."""
+    """t at which the ray crosses a member, relative to the hit: negative before it."""
     if _share_axis(met.corners, corners_at(tree, place)):
         return 0.0
     face = seen_from(tree, place, _anchor_at(met, 0.0))
@@ -138,7 +138,9 @@ def _spot_of(tree, place, number, met):
 
 @inlined
 def _areas_at(corners, o):
-    """The normal of a face, and for each corner the product of that and the normal of the face with a point instead."""
+    """The normal of a face, and for each corner its product with the normal of the face that has the point in place of
+    that corner.
+    """
     a, b, c = sub(corners[0], o), sub(corners[1], o), sub(corners[2], o)
     n = cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]))
     return n, (dot(n, cross(b, c)), dot(n, cross(c, a)), dot(n, cross(a, b)))
@@ -146,7 +148,7 @@ def _areas_at(corners, o):
 
 @kernel
 def list_members(tree, surfaces, spot, d, holders, count):
-    """The ``Members`` at a ``Spot`` that a ray of direction d met, of those that ``list_near`` has listed: at least the
+    """The ``Members`` at a ``Spot`` hit by a ray of direction d, among those that ``list_near`` listed, at least the
     face of the spot; and the point, for ``member_spot``.
     """
     corners = corners_of(surfaces.vertices, surfaces.faces, spot.face, tree.scale)
@@ -168,14 +170,14 @@ def list_members(tree, surfaces, spot, d, holders, count):
 
 @inlined
 def member_spot(tree, holders, k, spot, met):
-    """The ``Spot`` of the k-th member; ``spot`` is that of the face met."""
+    """The ``Spot`` of the k-th member; ``spot`` is that of the face hit."""
     number = holder(holders, k, NUMBER)
     return spot if number == spot.face else _spot_of(tree, holder(holders, k, PLACE), number, met)
 
 
 class _Around(NamedTuple):
-    """A point where faces that touch others are looked for, the room around it, the box of both, which faces touch
-    others, and where those found are listed.
+    """The search for touching faces at a point: the point, the room around it, the box of both, the marks of touching
+    faces, and the list of those found.
     """
 
     o: Any
@@ -188,8 +190,8 @@ class _Around(NamedTuple):
 
 @kernel
 def list_near(tree, surfaces, spot, stack, holders):
-    """List the faces that touch others and may hold a spot, as far as float64 tells; returns their number, mostly 1.
-    ``stack`` is as for ``search.depart``.
+    """List the touching faces that may contain a spot, as float64 can tell. Returns their number, usually 1. ``stack``
+    as in ``search.depart``.
     """
     corners = corners_of(surfaces.vertices, surfaces.faces, spot.face, tree.scale)
     o = barycentric(corners[0], corners[1], corners[2], spot.u, spot.v)
@@ -206,7 +208,7 @@ def _enter(tree, query, node, count):
 
 @inlined
 def _list_in(tree, query, first, blocks, count):
-    """List those of the faces of some blocks that touch others and may hold a point."""
+    """List the touching faces of some blocks that may contain a point."""
     for slot in range(first * BLOCK_FACES, (first + blocks) * BLOCK_FACES):
         face = load(tree.faces, slot)
         if face >= 0 and load(query.touching, face) != 0:
@@ -219,7 +221,7 @@ def _list_in(tree, query, first, blocks, count):
 
 @kernel
 def _hold_sign(corners, o, room):
-    """Whether a face holds a point: 1 if it does, -1 if not, 0 where rounding may matter."""
+    """1 if a face contains a point, -1 if not, 0 if rounding could decide."""
     a, b, c = corners
     for k in range(3):
         low, high = minimum(a[k], minimum(b[k], c[k])), maximum(a[k], maximum(b[k], c[k]))
@@ -233,7 +235,7 @@ def _hold_sign(corners, o, room):
 
 @kernel
 def _keep_members(tree, met, holders, count):
-    """Keep those of the listed faces that are members; returns their number."""
+    """Keep only the listed faces that are members. Returns their number."""
     kept = 0
     for k in range(count):
         place, face = holder(holders, k, PLACE), holder(holders, k, NUMBER)
@@ -247,7 +249,7 @@ def _keep_members(tree, met, holders, count):
 
 @inlined
 def _put_face(holders, count, place, face, held):
-    """Put a face where its number says among those listed, unless there is no room; returns how many there are."""
+    """Insert a face into the list by its number, if there is room. Returns the number listed."""
     if count >= MOST_HOLDERS:
         return count
     k = count

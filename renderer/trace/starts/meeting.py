@@ -1,8 +1,8 @@
-"""A face as a ray meets it from its exact start: it holds the start, is hit further on, or is not met.
+"""A face as a ray hits it from its exact start: it contains the start, is hit further on, or is missed.
 
-All signs are those of sums of pairs, and exact where the start is not one of their terms. What is less than their error
-counts as 0: what is nearer than 2^-88 of the size of both faces together. Faces that share a side with the face of the
-start are judged exactly: what lies on that face is on the same side of another as the corner beside the common side.
+All signs are those of sums of pairs, and exact if the start is not one of their terms. Less than their error counts as
+0: less than 2^-88 of the size of both faces together. Faces that share a side with the face of the start are judged
+exactly: a point of that face is on the same side of another face as the corner opposite to the common side.
 """
 
 from typing import Any, NamedTuple
@@ -28,15 +28,16 @@ from renderer.trace.starts.anchor import from_anchor, one_of
 
 MISSES, IS_HIT, HOLDS = 0, 1, 2
 NONE = -1
-# A product of three vectors errs by less than 2^-94 of the products of their largest components, and the way to a
-# corner by 2^-100 of what it is the difference of.
+# A product of three vectors errs by less than 2^-94 of the products of their largest components, and the vector to a
+# corner by 2^-100 of the terms of its difference.
 _ERROR, _WAY_ERROR = 2.0**-94, 2.0**-98
 
 
 class SeenFace(NamedTuple):
-    """A face from an anchor, scaled by a power of two: the ways to its corners and its normal, as pairs; the corners in
-    the tree's units; how much in that unit is one of the tree's; the product of the sides, of which the normal errs by
-    a share; the errors of the ways; and for each corner the one of the anchor's face in its place, NONE for none.
+    """A face seen from an anchor, scaled by a power of two: the vectors to its corners and its normal, as pairs; the
+    corners in the tree's units; the length of one of the tree's units in that scale; the product of the sides, which
+    scales the normal's error; the errors of the vectors; and for each corner the equal corner of the anchor's face,
+    NONE for none.
     """
 
     a0: Any
@@ -51,7 +52,7 @@ class SeenFace(NamedTuple):
 
 
 class Meeting(NamedTuple):
-    """How a ray meets a face: the kind, t, u, v and their denominator, whose sign is that of the determinant.
+    """A ray against a face: the kind of hit, t, u, v and their denominator, which has the sign of the determinant.
 
     zeros  the bits of the corners whose weights are 0
     """
@@ -71,21 +72,21 @@ def _equal(p, q):
 
 @inlined
 def _same(anchor, p):
-    """The corner of the anchor's face that is in the place p, NONE for none."""
+    """The corner of the anchor's face at the place p, NONE for none."""
     a, b, c = anchor.corners
     return 0 if _equal(a, p) else (1 if _equal(b, p) else (2 if _equal(c, p) else NONE))
 
 
 @inlined
 def _way_error(anchor, p, factor):
-    """The error of the way from an anchor to a corner: of the two that it is the difference of."""
+    """The error of the vector from an anchor to a corner, a difference of two."""
     way = largest_component(heads(anchor.way)) * anchor.unit
     return _WAY_ERROR * factor * (largest_component(sub(p, anchor.base)) + way)
 
 
 @kernel
 def seen_from(tree, place, anchor):
-    """The face at a place of a block, as ``SeenFace``."""
+    """The face at a place of a block, as a ``SeenFace``."""
     p0, p1, p2 = corners_at(tree, place)
     o = anchor.base
     reach = largest_of_three(sub(p0, o), sub(p1, o), sub(p2, o))
@@ -112,7 +113,7 @@ def _size(a):
 
 @kernel
 def _way_sign(face, d, i, j):
-    """The sign of d . (a x b) for the ways to two corners, 0 where rounding may have made it; and the value."""
+    """The sign of d . (a x b) for the vectors to two corners, 0 if rounding could decide it; and the value."""
     a, b = _way(face, i), _way(face, j)
     value = dot_pairs(d, cross_pairs(a, b))[0]
     return _sign_beyond(value, _size(d) * _error_of(face, i, j)), value
@@ -125,21 +126,21 @@ def _way(face, k):
 
 @inlined
 def _error_of(face, i, j):
-    """The error of the vector product of the ways to two corners."""
+    """The error of the cross product of the vectors to two corners."""
     a, b = _size(_way(face, i)), _size(_way(face, j))
     return a * b * _ERROR + a * one_of(face.errors, j) + b * one_of(face.errors, i)
 
 
 @kernel
 def _corner_sign(face, i, j):
-    """The sign of normal . (a x b) of the ways to two corners, 0 where rounding may have made it; and the value."""
+    """The sign of normal . (a x b) for the vectors to two corners, 0 if rounding could decide it; and the value."""
     value = dot_pairs(face.normal, cross_pairs(_way(face, i), _way(face, j)))[0]
     return _sign_beyond(value, face.sides * _error_of(face, i, j)), value
 
 
 @kernel
 def turn_sign(face, a, b):
-    """The sign of normal . (a x b) of vectors of pairs, 0 where rounding may have made it."""
+    """The sign of normal . (a x b) for vectors of pairs, 0 if rounding could decide it."""
     value = dot_pairs(face.normal, cross_pairs(a, b))[0]
     return _sign_beyond(value, face.sides * _size(a) * _size(b) * _ERROR)
 
@@ -152,13 +153,13 @@ def has_area(face):
 
 @kernel
 def lean_sign(face, x):
-    """The sign of normal . x of a vector of pairs, 0 where rounding may have made it."""
+    """The sign of normal . x for a vector of pairs, 0 if rounding could decide it."""
     return _sign_beyond(dot_pairs(face.normal, x)[0], face.sides * _size(x) * _ERROR)
 
 
 @kernel
 def slope_of(face, d):
-    """The sign of normal . d of a direction of float64, 0 where it is in the face's plane."""
+    """The sign of normal . d for a float64 direction, 0 if it lies in the face's plane."""
     p0, p1, p2 = face.corners
     sign = slope_sign(p0, p1, p2, d, local_doubles())
     return lean_sign(face, as_pairs(d)) if sign == UNDECIDED else sign
@@ -166,7 +167,7 @@ def slope_of(face, d):
 
 @kernel
 def slope_there(anchor, d):
-    """``slope_of`` the face of an anchor."""
+    """``slope_of`` an anchor's face."""
     p0, p1, p2 = anchor.corners
     sign = slope_sign(p0, p1, p2, d, local_doubles())
     return 0 if sign == UNDECIDED else sign
@@ -174,7 +175,7 @@ def slope_there(anchor, d):
 
 @kernel
 def height_sign(face):
-    """The sign of normal . (p0 - start), 0 where the start is in the face's plane."""
+    """The sign of normal . (p0 - start), 0 if the start lies in the face's plane."""
     error = face.sides * (_size(face.a0) * _ERROR + face.errors[0])
     return _sign_beyond(dot_pairs(face.normal, face.a0)[0], error)
 
@@ -197,7 +198,7 @@ def _is_after(i, j):
 
 @kernel
 def _common(face, anchor, slope, i, j, sign):
-    """The sign of direction . (way to corner i x way to corner j): exact where the side is one of the anchor's face."""
+    """The sign of direction . (way to corner i x way to corner j), exact for a side of the anchor's face."""
     a, b = face.same[i], face.same[j]
     if a == b or a < 0 or b < 0:  # NONE is the one below 0
         return sign
@@ -207,7 +208,7 @@ def _common(face, anchor, slope, i, j, sign):
 
 @kernel
 def _height(face, anchor):
-    """The sign of normal . (p0 - start): exact where the face shares a side with the anchor's."""
+    """The sign of normal . (p0 - start), exact if the face shares a side with the anchor's."""
     a, b, c = face.same
     shared = int(a != NONE) + int(b != NONE) + int(c != NONE)
     if shared == 3:
@@ -228,8 +229,8 @@ def _height(face, anchor):
 
 @kernel
 def meet_face(face, anchor, d, slope_there, dz):
-    """How a ray in direction d, scaled to about 1, meets a face; ``dz`` is the direction's largest component, and
-    ``slope_there`` the ``slope_of`` the anchor's own face.
+    """The ``Meeting`` of a ray in direction d, scaled to about 1, with a face; ``dz`` is the direction's largest
+    component, and ``slope_there`` the ``slope_of`` the anchor's face.
     """
     if not has_area(face):
         return _none()
@@ -253,7 +254,7 @@ def meet_face(face, anchor, d, slope_there, dz):
 
 @kernel
 def _held(face, anchor, d, dz):
-    """The meeting of a face with a start in its plane: it holds the start, or is not met."""
+    """The ``Meeting`` with a face whose plane contains the start: the face contains it, or is missed."""
     s0, e0 = _corner_sign(face, 1, 2)
     s1, e1 = _corner_sign(face, 2, 0)
     s2, e2 = _corner_sign(face, 0, 1)
@@ -277,8 +278,8 @@ def _zeros(s0, s1, s2):
 
 @inlined
 def _weights(e0, e1, e2, slope, dz):
-    """Barycentrics u and v, of edge functions of one sign, as numerators over a denominator of the sign that
-    ``intersect`` gives the determinant of a face with normal . direction of the sign ``slope``.
+    """Barycentrics u and v, from edge functions of one sign, as numerators over a denominator with the sign that
+    ``intersect`` gives the determinant for ``slope``, the sign of normal . direction.
     """
     e0, e1, e2 = abs(e0), abs(e1), abs(e2)
     turn = -1.0 if (slope > 0) == (dz > 0.0) else 1.0
@@ -288,7 +289,7 @@ def _weights(e0, e1, e2, slope, dz):
 
 @inlined
 def barycentrics_of(met):
-    """u and v of a ``Meeting``: exactly 0 or 1, or 1 in all, where it is on an edge or corner."""
+    """u and v of a ``Meeting``: exactly 0 or 1, or 1 in total, on an edge or corner."""
     u, v = (0.0 if met.zeros & 2 != 0 else met.u / met.w), (0.0 if met.zeros & 4 != 0 else met.v / met.w)
     if met.zeros & 1 == 0:
         return u, v

@@ -1,4 +1,4 @@
-"""The starts of a batch of rays on the surface, as kernels read them: one row a ray."""
+"""The starts of a batch of rays on the surface, as kernels read them: one row for each ray."""
 
 from typing import Any, NamedTuple
 
@@ -13,7 +13,7 @@ from renderer.numerics.vec3 import largest_component, row3, scale, three
 ROW_STEP, VERTICES, FACES, HEAD = 0, 1, 2, 8
 # The columns of a row, float64: the slack of ``intersect.Ray``, EDGE where the start is on an edge, or stopped at once;
 # the face, -1 for none; the code; the anchor: the point as given, or the barycentrics u and v and, of a ray that came
-# through the face, PILE: the face at which it came upon those that coincide there; and the way back, a direction that
+# through the face, PILE: the first of the faces that coincide there; and the way back, a direction that
 # is on the side where the ray starts.
 SLACK, FACE, CODE, ANCHOR, PILE, WAY, ROW = 0, 1, 2, 3, 5, 6, 9
 # The slack of a ray that no search takes as it is: ``search.search_from`` decides.
@@ -33,10 +33,10 @@ class StartPointers(NamedTuple):
 
 
 class Start(NamedTuple):
-    """How one ray starts on the surface.
+    """The start of one ray on the surface.
 
     corners  those of the face, in the tree's units
-    anchor   the point as given, in the tree's units, or u, v and the pile
+    anchor   the given point, in the tree's units, or u, v and the pile
     """
 
     corners: Any
@@ -59,7 +59,7 @@ def start_pointers(starts):
 
 @inlined
 def start_at(starts, i, unit):
-    """The ``Start`` of ray ``i``, whose face is not -1, in units of which ``unit`` are one of the mesh."""
+    """The ``Start`` of ray ``i``, whose face is not -1; ``unit`` of its units are one of the mesh."""
     row = offset(starts.rows, i * starts.step)
     face, code = np.int64(load(row, FACE)), np.int64(load(row, CODE))
     anchor = (load(row, ANCHOR), load(row, ANCHOR + 1), load(row, ANCHOR + 2))
@@ -70,7 +70,7 @@ def start_at(starts, i, unit):
 
 @inlined
 def way_back(starts, i):
-    """The way back of ray ``i``, whose code has BACK."""
+    """The vector back of ray ``i``, whose code has BACK."""
     return three(starts.rows, i * starts.step + WAY)
 
 
@@ -83,7 +83,7 @@ def corners_of(vertices, faces, face, unit):
 
 @inlined
 def slack_of(o, distance):
-    """The slack of a ray that starts at o, some distance from the surface: ``intersect.near_planes`` compares heights
-    with a product that may be an eighth of what it stands for.
+    """The slack of a ray that starts at o, some distance from the surface. ``intersect.near_planes`` compares heights
+    with a product that may be an eighth of the true one.
     """
     return 8.0 * (distance + 2.0**-51 * largest_component(o))

@@ -1,9 +1,10 @@
-"""Whether a ray from the surface stays in the region that it starts in, and else the face that stops it.
+"""Whether a ray from the surface stays in the region in which it starts, and otherwise the face that stops it.
 
-The cones of the faces that hold a start divide the sphere of directions into regions. Two directions are in one region
-where no closed curve of arcs separates them. A path between them crosses every closed curve an even number of times
-then; that is so where the parities of its crossings are differences of one bit a node (the cohomology of the arcs, by
-Alexander's duality). A forest of the nodes with the parities to their parents tells in one pass over the arcs.
+The cones of the faces that contain a start divide the sphere of directions into regions. Two directions are in one
+region if no closed curve of arcs separates them, that is, if a path between them crosses every closed curve an even
+number of times. This holds if the parities of its crossings are differences of one bit for each node (the cohomology of
+the arcs, by Alexander's duality). A forest of the nodes with the parities to their parents decides it in one pass over
+the arcs.
 """
 
 from typing import Any, NamedTuple
@@ -52,7 +53,7 @@ def hub_of(attempt):
 
 @kernel
 def path_to_cone(tree, anchor, holders, count, k, side, attempt, word):
-    """Write the parities of the path from the hub to the k-th cone, on one side of its face; returns whether it meets
+    """Write the parities of the path from the hub to the k-th cone, on one side of its face. Returns whether it touches
     no outline.
     """
     hub, own = hub_of(attempt), cone_of(tree, anchor, holders, k)
@@ -75,7 +76,7 @@ def path_to_cone(tree, anchor, holders, count, k, side, attempt, word):
 
 @kernel
 def _parity_beside(cone, own, hub, middle, side):
-    """The parity of the path from the hub to a direction in the plane of a cone, which another cone has too."""
+    """The parity of the path from the hub to a direction in the plane of two cones."""
     where = within_cone(cone, middle)
     if where < 0:
         return 0
@@ -89,7 +90,7 @@ def _parity_beside(cone, own, hub, middle, side):
 
 @kernel
 def _path_to_direction(tree, anchor, holders, count, d, attempt, word):
-    """Write the parities of the path from the hub to a direction; returns whether it meets no outline."""
+    """Write the parities of the path from the hub to a direction. Returns whether it touches no outline."""
     for j in range(count):
         cone = cone_of(tree, anchor, holders, j)
         parity = crosses(cone, hub_of(attempt), as_pairs(d), slope_of(cone.face, d))
@@ -138,8 +139,8 @@ def are_even(holders, count, nodes):
 def _is_connected(tree, anchor, holders, count, nodes):
     """Whether the ends of both paths are in one region, or the second end is on its outline.
 
-    A path that ends on an arc crosses it or not, as it comes from one side or the other: with those that coincide with
-    it, but without others that meet it there.
+    A path that ends on an arc crosses it or not, depending on the side from which it comes. This includes arcs that
+    coincide with it, but not others that touch it there.
     """
     for j in range(count):
         put_holder(holders, j, FREE_PATH, 0)
@@ -178,9 +179,8 @@ def _bounds_region(tree, anchor, holders, count, nodes, k, side, j, facing):
 
 
 class Behind(NamedTuple):
-    """The face that a ray has behind it at its start: its number, the side of it that the ray is on, whether the ray
-    came through it, and the pile of ``_arc_ahead``. Where the side is known to be that of a direction, that is
-    ``back``.
+    """The face behind a ray at its start: its number, the side of it that the ray is on, whether the ray came through
+    it, and the pile of ``_arc_ahead``. If the side is known from a direction, that is ``back``.
     """
 
     face: int
@@ -193,11 +193,11 @@ class Behind(NamedTuple):
 
 @kernel
 def stopping_holder(tree, anchor, arcs, count, nodes, behind, d):
-    """The arc that stops a ray at its start, or NOT_STOPPED; and whether it is the next one of a pile.
+    """The arc that stops a ray at its start, or NOT_STOPPED; and whether it is the next of a pile.
 
-    The ray starts in the region beside the arcs of a face, on one side of it. Where these bound several regions it is
-    the one with ``back`` in it, else any of them. The ray is stopped where its direction d leads out of that region: by
-    the lowest face that bounds it, and not on both sides, and has d behind it.
+    The ray starts in the region beside the arcs of a face, on one side of it. If these bound several regions, it is the
+    one that contains ``back``, else any of them. If its direction d leads out of that region, the ray is stopped by the
+    lowest face that bounds the region on one side only and has d behind it.
     """
     own, is_open = _own_arc(tree, anchor, arcs, count, nodes, behind, d, behind.has_back)
     if own == NOT_STOPPED:
@@ -230,8 +230,8 @@ def stopping_holder(tree, anchor, arcs, count, nodes, behind, d):
 
 @kernel
 def _own_arc(tree, anchor, arcs, count, nodes, behind, d, has_back):
-    """An arc of the face behind a ray, beside which it is, and whether d is in a region beside one of them. With
-    ``has_back`` only those count beside which ``back`` is; NOT_STOPPED for none.
+    """An arc of the face behind a ray, beside which the ray is, and whether d is in a region beside one of them. With
+    ``has_back`` only arcs beside which ``back`` is count; NOT_STOPPED for none.
     """
     own = NOT_STOPPED
     for k in range(count):
@@ -248,8 +248,8 @@ def _own_arc(tree, anchor, arcs, count, nodes, behind, d, has_back):
 def _arc_ahead(tree, anchor, arcs, count, own, behind, d):
     """The next arc that coincides with the one behind a ray, which has just gone through it, or NOT_STOPPED.
 
-    The ray came upon the pile of faces that coincide there at the face ``pile``. From that on it goes through them in
-    the order of their numbers, the lowest after the highest, however it leads on to that side.
+    The ray reached the pile of coinciding faces at the face ``pile``. From there it crosses them in the order of their
+    numbers, the lowest after the highest, if it leads to that side.
     """
     best = NOT_STOPPED
     if slope_of(cone_of(tree, anchor, arcs, own).face, d) != behind.side:
@@ -298,7 +298,7 @@ def _lower(holders, k, j):
 
 @kernel
 def coincide(tree, anchor, holders, k, j):
-    """Whether the cone of the j-th holder is in the plane of the k-th one and has its middle in it."""
+    """Whether the j-th holder's cone lies in the plane of the k-th one and the k-th one contains its middle."""
     own, cone = cone_of(tree, anchor, holders, k), cone_of(tree, anchor, holders, j)
     if lean_sign(cone.face, own.first) != 0 or lean_sign(cone.face, own.second) != 0:
         return False
@@ -311,9 +311,9 @@ def coincide(tree, anchor, holders, k, j):
 
 @kernel
 def bounding_holder(tree, anchor, arcs, count, nodes, n, face):
-    """The arc that bounds the region with direction n in it, and the side of it: of ``face`` if one does, else the one
-    that n is most across, lower ones first. NOT_STOPPED for none. Where n lies along faces it is on the side of the
-    lowest one's normal.
+    """The arc that bounds the region with direction n, and its side: an arc of ``face`` if one does, else the one that
+    n crosses most steeply, lower ones first. NOT_STOPPED for none. If n lies along faces, it is on the side of the
+    normal of the lowest.
     """
     along = _arc_along(tree, anchor, arcs, count, n)
     if along != NOT_STOPPED:
@@ -330,7 +330,7 @@ def bounding_holder(tree, anchor, arcs, count, nodes, n, face):
 
 @kernel
 def _arc_along(tree, anchor, arcs, count, n):
-    """The arc of the lowest face that a direction lies on, or NOT_STOPPED."""
+    """The arc of the lowest face on which a direction lies, or NOT_STOPPED."""
     found = NOT_STOPPED
     for k in range(count):
         cone = cone_of(tree, anchor, arcs, k)
@@ -341,7 +341,7 @@ def _arc_along(tree, anchor, arcs, count, n):
 
 @kernel
 def _of_face(tree, anchor, arcs, count, nodes, k, side, face):
-    """An arc of a face beside the region of another arc, and its side; that other one where there is none."""
+    """An arc of a face beside the region of another arc, and its side; that other arc if there is none."""
     for j in range(count):
         if holder(arcs, j, NUMBER) == face:
             for facing in (1, -1):
@@ -352,7 +352,7 @@ def _of_face(tree, anchor, arcs, count, nodes, k, side, face):
 
 @kernel
 def _next_across(tree, anchor, arcs, count, n, most, last):
-    """The arc that n is most across after the one ``last``, whose product is ``most``; returns its product, too."""
+    """The arc that n crosses most steeply after the arc ``last``, whose product is ``most``; and its product."""
     best, found = -1.0, NOT_STOPPED
     for k in range(count):
         across = abs(dot(normalized(heads(cone_of(tree, anchor, arcs, k).face.normal)), n))

@@ -1,7 +1,7 @@
 """The closest hit of a ray from its exact start on the surface.
 
-The faces that hold the start do not stop the ray by rounding: ``region`` says whether one stops it at t = 0. Those near
-the start are met from the exact start, all others from its coordinates.
+The faces that contain the start do not stop the ray by rounding: ``region`` decides whether one stops it at t = 0.
+Faces near the start are tested from the exact start, all others from its coordinates.
 """
 
 from typing import Any, NamedTuple
@@ -71,7 +71,7 @@ _NEAR_HIT = 2.0**20
 
 @inlined
 def _box_holds(tree, place, o):
-    """Whether the box of a face, with _ROOM, holds a point."""
+    """Whether the box of a face, widened by _ROOM, contains a point."""
     p0, p1, p2 = corners_at(tree, place)
     holds, room = True, largest_component(o) * _ROOM
     for k in range(3):
@@ -81,8 +81,8 @@ def _box_holds(tree, place, o):
 
 
 class _Surroundings(NamedTuple):
-    """What is asked of the faces around a start: the anchor, as rounded too; the box around that; of a ray that leaves
-    it the direction, and the last two arguments of ``meet_face``; and where those that hold the anchor are listed.
+    """The search for faces around a start: the anchor, also as rounded; the box around it; for a ray that leaves it the
+    direction and the last two arguments of ``meet_face``; and the list of faces that contain the anchor.
     """
 
     anchor: Any
@@ -97,7 +97,7 @@ class _Surroundings(NamedTuple):
 
 @kernel
 def list_holders(tree, anchor, d, slope, dz, stack, holders):
-    """List the faces that hold an anchor, from which a ray leaves in direction d; returns their number."""
+    """List the faces that contain an anchor from which a ray leaves in direction d. Returns their number."""
     o = rounded(anchor)
     room = largest_component(o) * _ROOM
     low, high = sub(o, (room, room, room)), add(o, (room, room, room))
@@ -112,7 +112,7 @@ def _enter_around(tree, query, node, count):
 
 @kernel
 def _add_holders(tree, query, first, blocks, count):
-    """List those faces of some blocks that hold an anchor."""
+    """List the faces of some blocks that contain an anchor."""
     for block in range(first, first + blocks):
         for i in range(BLOCK_FACES):
             face, place = load(tree.faces, block * BLOCK_FACES + i), block * BLOCK_WORDS + i
@@ -125,7 +125,7 @@ def _add_holders(tree, query, first, blocks, count):
 
 @kernel
 def _stopped(tree, behind, anchor, count, d, slope, dz, holders):
-    """The ``Best`` hit that stops a ray at its start, which ``count`` faces hold."""
+    """The ``Best`` hit that stops a ray at its start, which ``count`` faces contain."""
     arcs, number, nodes = arcs_of(tree, anchor, holders, count)
     k, ahead = stopping_holder(tree, anchor, arcs, number, nodes, behind, d)
     if k == NOT_STOPPED:
@@ -135,9 +135,9 @@ def _stopped(tree, behind, anchor, count, d, slope, dz, holders):
 
 
 class Departure(NamedTuple):
-    """A ray as it leaves its start: as ``intersect.Ray``, its anchor, its direction scaled by a power of two, the
-    ``slope_there`` of that, and the power; whether its origin is off the anchor; and of a ray that
-    may be stopped how many faces hold the start.
+    """A ray at its start: as ``intersect.Ray``, its anchor, its direction scaled by a power of two, the ``slope_there``
+    of that, and the power; whether its origin is off the anchor; and, if it may be stopped, the number of faces that
+    contain the start.
     """
 
     ray: Any
@@ -153,7 +153,7 @@ class Departure(NamedTuple):
 def depart(tree, starts, i, ray, stack, memory):
     """The ``Departure`` of ray ``i``, and the ``Best`` hit that stops it at its start.
 
-    ``ray`` is as ``rays.ray_at`` has it. ``stack`` is memory for ``walk.stack_size`` int64, and ``memory`` for
+    ``ray`` is from ``rays.ray_at``. ``stack`` is memory for ``walk.stack_size`` int64, and ``memory`` for
     ``cone.HOLDERS_WORDS``.
     """
     start = start_at(starts, i, tree.scale)
@@ -177,8 +177,8 @@ def depart(tree, starts, i, ray, stack, memory):
 
 @kernel
 def stopped_again(tree, departure, face, pile, memory):
-    """The hit that stops a ray at its start once it went through ``face`` there, which stopped it; as of ``depart``,
-    with the same ``memory``. ``pile`` is the first face of those that coincide with it.
+    """The hit that stops a ray at its start after it went through ``face`` there; otherwise as ``depart``, with the
+    same ``memory``. ``pile`` is the first of the faces that coincide with it.
     """
     anchor, d, holders, dz = departure.anchor, departure.d, make_holders(memory), make_shear(departure.ray).direction_z
     side = slope_of(cone_of(tree, anchor, holders, holder_of(holders, departure.holders, face)).face, d)
@@ -188,8 +188,8 @@ def stopped_again(tree, departure, face, pile, memory):
 
 @inlined
 def near_bits(tree, block, departure, shear, seen):
-    """The bits of the faces of a block that are met from the exact start: those near it, and where the origin is off it
-    those of which that may have made the side that the ray passes on. So all are judged from one start.
+    """The bits of the faces of a block to test from the exact start: those near it and, if the origin is off it, those
+    whose edges the ray may therefore pass on the other side. So one start decides all of them.
     """
     if not departure.is_off and seen == 0:
         return np.int64(0)
@@ -200,7 +200,7 @@ def near_bits(tree, block, departure, shear, seen):
 
 @inlined
 def meet_near(tree, place, departure, dz):
-    """The ``FaceHit`` of a face that is met from the exact start, and its ``Meeting.zeros``."""
+    """The ``FaceHit`` of a face tested from the exact start, and its ``Meeting.zeros``."""
     met = meet_face(seen_from(tree, place, departure.anchor), departure.anchor, departure.d, departure.slope, dz)
     # rule: met-once
     t = maximum(met.t / departure.unit, _LEAST_T) if met.kind == IS_HIT else np.nan
@@ -264,7 +264,7 @@ def _visit(tree, query, first, count, found):
 
 @kernel
 def t_from(tree, starts, i, ray, face, t):
-    """Where a ray meets the plane of a face that it hits at t, counted from its exact start."""
+    """t from the exact start for the plane of a face that the ray hits at t."""
     anchor, (d, unit) = anchor_of(start_at(starts, i, tree.scale)), unit_direction((ray.dx, ray.dy, ray.dz))
     p0, p1, p2 = corners_of(starts.vertices, starts.faces, face, tree.scale)
     side = maximum(largest_component(sub(p1, p0)), largest_component(sub(p2, p0)))
@@ -291,9 +291,9 @@ def counted_from_start(tree, starts, i, ray, largest, hit, face):
 
 @kernel
 def take_side(tree, starts, n, stack, memory, table, room):
-    """Write to the row of a start on which side of its face it is, whose normal n says in which region; or on which
-    side of another face, if its own does not bound that. And write its ``fan`` to ``table``, if ``room`` float64 hold
-    it. Where n says nothing, the row stays.
+    """Write to the row of a start the side of its face that the normal n selects; or the side of another face, if its
+    own does not bound that region. Also write its ``fan`` to ``table``, if ``room`` float64 suffice. If n selects
+    nothing, the row stays.
     """
     start, holders = start_at(starts, 0, tree.scale), make_holders(memory)
     anchor, (d, _) = anchor_of(start), unit_direction(n)
@@ -322,6 +322,6 @@ def take_side(tree, starts, n, stack, memory, table, room):
 
 @kernel
 def side_taken(descriptor, vertices, faces, row, n, stack, memory):
-    """For Python: ``take_side`` of the start in a row of ``starts.record``."""
+    """``take_side`` for Python, for a start in a row of ``starts.record``."""
     starts = StartPointers(pointer(row), 0, pointer(vertices), pointer(faces))
     take_side(tree_pointers(descriptor), starts, n, pointer(stack), pointer(memory), local_doubles(), 0)

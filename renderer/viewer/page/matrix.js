@@ -6,6 +6,9 @@ export const scale = (a, s) => [a[0] * s, a[1] * s, a[2] * s];
 export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 export const norm = (a) => Math.hypot(...a);
 export const unit = (a) => scale(a, 1 / norm(a));
+// From vectors with y up to those with another axis up, as renderer/arguments/up.py turns them, and back.
+export const raised = ([x, y, z], up) => ({ x: [y, -x, z], y: [x, y, z], z: [x, -z, y] })[up];
+export const lowered = ([x, y, z], up) => ({ x: [-y, x, z], y: [x, y, z], z: [x, z, -y] })[up];
 export const cross = (a, b) => [
   a[1] * b[2] - a[2] * b[1],
   a[2] * b[0] - a[0] * b[2],

@@ -2,6 +2,7 @@
 import { Edits } from "./edits.js";
 import { element } from "./element.js";
 import { Folds } from "./folds.js";
+import { lowered, raised } from "./matrix.js";
 import { levelColor } from "./overlay.js";
 import { count } from "./readings.js";
 
@@ -116,7 +117,7 @@ export class Panel {
     const { sun } = this.edits;
     document.querySelector("#light").disabled = !sun;
     if (!sun) return;
-    const [x, y, z] = sun.direction.map((v) => -v);
+    const [x, y, z] = lowered(sun.direction, this.scene.up).map((v) => -v);
     this.fields.azimuth.value = Math.atan2(x, z) / DEGREE;
     this.fields.elevation.value = Math.atan2(y, Math.hypot(x, z)) / DEGREE;
   }
@@ -124,7 +125,7 @@ export class Panel {
   // The direction in which light travels by the sliders.
   get sliders() {
     const [a, e] = [this.fields.azimuth.value * DEGREE, this.fields.elevation.value * DEGREE];
-    return [-Math.cos(e) * Math.sin(a), -Math.sin(e), -Math.cos(e) * Math.cos(a)];
+    return raised([-Math.cos(e) * Math.sin(a), -Math.sin(e), -Math.cos(e) * Math.cos(a)], this.scene.up);
   }
 
   // The settings of a view as the server reads them.

@@ -22,7 +22,7 @@ from validation.defects.edits import value
 from validation.defects.inject import PACKAGE, inject
 from validation.defects.list import DEFECTS
 from validation.defects.places import find_name, rules
-from validation.defects.record import gates, idle, record
+from validation.defects.record import _VIEWS, KEPT, gates, idle, record
 from validation.defects.seeded.defect import Defect
 from validation.report import page as report
 
@@ -40,7 +40,7 @@ DEFECTS = [next(defect for defect in ALL if defect.name == "sRGB applied twice")
         "nonsense": value("1 // 0"),
         "endless": value("exec('while True: pass')"),
     }.items()
-] + [Defect("studies", "without a judge", Rule("rounded-encoding", value("_")))]
+] + [Defect("studies", "public names without a test or gate", Rule("rounded-encoding", value("_")))]
 
 def run(group):
     from renderer.picture.image import srgb
@@ -228,3 +228,13 @@ def test_record_tells_what_each_measure_caught_alone() -> None:
     assert rows["caught"] == 2
     assert not gates(chosen, Answer(names, names[:1], None, 1.0), answers)[0].passed
     assert idle(rows).value == 2.0  # mean_error and wrong: each was red together with the other
+
+
+def test_kinds_with_a_reason_are_quantities_of_gates() -> None:
+    """A gate that was renamed would lose its reason."""
+    sources = [path for path in (ROOT / "validation").rglob("*.py") if path.name != "record.py"]
+    text = "".join(path.read_text(encoding="utf-8") for path in sources)
+    known = {*KEPT, *_VIEWS, *_VIEWS.values()} - {"extreme case"}
+    missing = [name for name in known if f'"{name}"' not in text]
+    # Made from the names of what a pixel shows.
+    assert sorted(missing) == ["pixels whose distance is off", "pixels whose position is off"]

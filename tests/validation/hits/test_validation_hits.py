@@ -93,8 +93,8 @@ def _swap_two_faces(octree: Octree) -> None:
 @pytest.mark.parametrize("change", [_drop_a_face, _scale_vertices, _swap_two_faces])
 def test_a_broken_octree_turns_a_gate_red(change: Callable[[Octree], None], monkeypatch: pytest.MonkeyPatch) -> None:
     broken(monkeypatch, change)
-    sample = "of the exact sample, rays on which we are wrong"
-    assert failing(checked(ball())[1]) == {"rays on which we are wrong", sample}
+    sample = "wrong hits in the exact sample"
+    assert failing(checked(ball())[1]) == {"wrong hits", sample}
 
 
 def _blind(octree: Octree) -> None:
@@ -103,10 +103,10 @@ def _blind(octree: Octree) -> None:
 
 def test_any_hit_that_differs_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     broken(monkeypatch, _blind)
-    assert failing(checked(ball())[1]) == {"any-hit differs from closest hit", FEW}
+    assert failing(checked(ball())[1]) == {"any_hit differs from closest_hit", FEW}
 
 
-FEW = "asked a few at a time, rays with another hit"
+FEW = "other hits in small batches"
 
 
 def _miss_alone(octree: Octree) -> None:

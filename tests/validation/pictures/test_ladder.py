@@ -42,7 +42,7 @@ def test_a_rung_that_adds_nothing_is_left_out_with_its_reason() -> None:
     assert left_out["glass"] == "no surface of the scene is a dielectric or has a constant transmittance"
     assert left_out["mirrors"] == "no surface of the scene is a mirror or has a constant reflectance"
     assert left_out["highlights"] == "no surface of the scene has highlights"
-    assert left_out["shadows"].startswith("it is the scene as it is already")
+    assert left_out["shadows"].startswith("equal to the whole scene")
 
 
 def test_shadows_come_with_the_scenes_own_lights() -> None:

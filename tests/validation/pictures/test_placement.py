@@ -52,7 +52,7 @@ def test_an_object_turned_otherwise_is_seen(tmp_path: Path, monkeypatch: pytest.
     rotate = list(sound.objects[0].rotate)
     rotate[axis] += 0.01
     other = sound.objects[0].model_copy(update={"rotate": tuple(rotate)})
-    wrong = sound.altered(objects=(other,))  # and the meshes as they were placed
+    wrong = sound.model_copy(update={"objects": (other,)})  # and the meshes as they were placed
     assert verdicts(wrong) == [False, False]
 
 

@@ -22,7 +22,7 @@ def test_gates_and_rows_of_all_pictures(monkeypatch):
     assert len(said) == unseen.steps() and len(rows) == len(gates) == 4 + 10 + 6
     assert all(gate.passed for gate in gates)
     assert all((row["wrong"] is None) != (row["error"] is None) and row["pixels"] > 0 for row in rows)
-    assert "What cannot be seen" in (Path(page.__file__).parent / "templates" / "pictures.html").read_text("utf-8")
+    assert "m.images.unseen" in (Path(page.__file__).parent / "templates" / "pictures.html").read_text("utf-8")
 
 
 @cases("name", unseen.mirror_bodies())

@@ -194,7 +194,7 @@ def test_a_rung_that_nobody_judges_is_not_passed(tmp_path: Path, monkeypatch: py
     nobody = Reference("path", mitsuba_path.NAME, lambda _: "no reason", whitted)
     monkeypatch.setattr(plan, "REFERENCES", (nobody,))
     record, gates = check(tmp_path, stairs(), PictureEffort(24, paths=False))
-    assert failing(gates) == ["small, everything: references that judge it is 0"]
+    assert failing(gates) == ["small, everything: references is 0"]
     assert record["rungs"][0]["left_out"] == {mitsuba_path.NAME: "no reason"}
 
 

@@ -34,7 +34,7 @@ def red(found: tuple[dict[str, Any], list[Gate]]) -> list[str]:
 
 def test_a_name_without_a_judge_turns_the_gate_red(checkout: Path) -> None:
     found = check_names([GATE], (), checkout)
-    assert red(found) == ["without a judge"] and len(found[1]) == 2
+    assert red(found) == ["public names without a test or gate"] and len(found[1]) == 2
     assert found[0]["rows"] == [
         {"name": "load", "tests": ["test_files.py::test_load"], "gates": {}},
         {"name": "save", "tests": [], "gates": {}},
@@ -50,7 +50,7 @@ def test_gates_that_name_what_they_judge_count(checkout: Path) -> None:
 
 def test_a_judge_of_an_unknown_name_turns_a_gate_red(checkout: Path) -> None:
     found = check_names([replace(GATE, judged=("save", "saev"))], (), checkout)
-    assert red(found) == ["judged, and not public"] and found[0]["unknown"] == ["saev"]
+    assert red(found) == ["tested names that are not public"] and found[0]["unknown"] == ["saev"]
     (checkout / "tests" / "test_more.py").write_text('@pytest.mark.judges("laod")\ndef test(): ...\n')
     assert check_names([], (), checkout)[0]["unknown"] == ["laod"]
 
@@ -59,7 +59,7 @@ def shown(found: dict[str, Any]) -> str:
     """The section of the report, without promises."""
     environment = Environment(loader=FileSystemLoader(page._TEMPLATES), undefined=StrictUndefined)
     environment.filters["number"] = page.number
-    environment.globals["titles"] = {"hits": "Hits", "queries": "Queries"}
+    environment.globals["partials"] = page.PARTIALS
     return environment.get_template("promises.html").render(m={"promises": {"rows": [], "names": found}})
 
 

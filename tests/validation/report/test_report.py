@@ -28,10 +28,11 @@ def png(path: Path, grey: int, width: int = 2, height: int = 1) -> None:
 @pytest.fixture
 def metrics(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """Of a run of the pictures alone, one gate of which fails; its partial shows the same pictures twice."""
-    slider = '{{ slider("a.png", "b.png", "c.png", "a scene") }}'
-    (tmp_path / "plain.html").write_text('{% from "macros.html" import slider %}' + slider * 2)
+    triple = '{{ triple({"ours": "a.png", "reference": "b.png", "difference": "c.png"}, "a scene") }}'
+    (tmp_path / "plain.html").write_text('{% from "macros.html" import triple %}' + triple * 2)
     monkeypatch.setattr(report, "_TEMPLATES", [report._TEMPLATES, tmp_path])
-    monkeypatch.setattr(report, "PARTIALS", report.PARTIALS | {"images": ("Pictures", "plain.html")})
+    plain = report.PARTIALS["images"]._replace(template="plain.html")
+    monkeypatch.setattr(report, "PARTIALS", report.PARTIALS | {"images": plain})
     for name, grey in (("a.png", 10), ("b.png", 20), ("c.png", 10)):
         png(tmp_path / name, grey)
     gates = [
@@ -44,7 +45,8 @@ def metrics(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     return {
         "schema": 3, "command": "python -m validation --only images", "quick": False, "own": True,
         "started": "2026-01-01T10:00:00+00:00", "seconds": 3.0, "verdict": summary.verdict(gates), "matrix": rows,
-        "facts": summary.facts(rows, gates, None), "thresholds": {"file": None, "moved": {}}, "gates": gates,
+        "facts": summary.facts({"images": record}, gates, None), "thresholds": {"file": None, "moved": {}},
+        "gates": gates,
         "left_out": {"hits": "not named by --only"}, "baseline": {"absent": "There is none."}, "images": record,
         "environment": {"python": "3.11", "processor": "one", "threads": 2, "platform": "p", "packages": {"numpy": "2"},
                         "sources": "0" * 64},
@@ -54,7 +56,7 @@ def metrics(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 def test_the_page_stands_alone_and_holds_each_picture_once(metrics: dict[str, Any], tmp_path: Path) -> None:
     schema.check(metrics)
     page = report.page(metrics, tmp_path)
-    assert page.count('class="slider"') == 2
+    assert page.count('class="triple"') == 2
     # Three names, but two of them hold the same picture.
     assert page.count("data:image/png;base64,") == 2 and page.count("aspect-ratio: 2 / 1") == 2
     outside = re.findall(r'(?:src|href)="(?!#|data:|pictures/)[^"]*"|url\((?!"data:)|@import|<link', page)
@@ -66,9 +68,14 @@ def test_the_page_stands_alone_and_holds_each_picture_once(metrics: dict[str, An
 def test_the_verdict_comes_first_and_names_what_fails(metrics: dict[str, Any], tmp_path: Path) -> None:
     page = report.page(metrics, tmp_path)
     assert "1 of 2 gates hold" in page
-    top = page[: page.index('id="checked"')]
+    top = page[: page.index('id="sections"')]
     assert "glass: ssim" in top and "stairs" not in top
     assert 'href="pictures/failed/glass-ours.exr"' in top
+    assert page.index("<details") > page.index('id="sections"')
+    # The section that fails is open, and no other.
+    assert page.count('" open>') == 1 and 'id="section-images" open>' in page
+    order = [page.index(f'id="{name}"') for name in ("section-images", "references", "defects", "versions")]
+    assert order == sorted(order)
     assert "Mitsuba &lt;3&gt;" in page and "not named by --only" in page and "There is none." in page
 
 
@@ -127,3 +134,28 @@ def test_every_key_of_the_schema_is_in_the_readme() -> None:
 def test_a_failure_that_rounds_to_its_threshold_keeps_its_digits() -> None:
     nearly = Gate("images", "glass", "ssim", 1.0 - 2**-40, "at least", 1.0, "why").record()
     assert summary.failure(nearly) == "ssim is 0.9999999999990905, expected at least 1"
+
+
+def test_five_numbers_at_the_head_each_over_what_was_counted() -> None:
+    gates = [
+        Gate("hits", "a, camera", "wrong hits", 0.0, "at most", 0.0, "").record(),
+        Gate("hits", "a, edges", "wrong hits", 2.0, "at most", 0.0, "").record(),
+        Gate("hits", "a", "leaks", float("nan"), "at most", 0.0, "").record(),
+        Gate("queries", "inside", "wrong answers", 0.0, "at most", 0.0, "").record(),
+    ]
+    families = [{"rays": 1000}, {"rays": 500}]
+    records: dict[str, Any] = {"hits": {"meshes": [{"families": families}]}, "queries": {"rows": [{"asked": 40}]}}
+    found = [(fact["value"], fact["label"].partition(":")[0]) for fact in summary.facts(records, gates, None)]
+    assert found == [
+        (2.0, "wrong hits in 1,500 rays"),
+        (None, "leaks through closed meshes, in 1 sets of rays"),
+        (0.0, "wrong answers in 40 queries"),
+    ]
+
+
+def test_every_table_scrolls_by_itself_and_the_page_is_as_wide_as_a_phone() -> None:
+    """A table of seven columns had made the whole page wider than a phone."""
+    texts = {path.name: path.read_text(encoding="utf-8") for path in (report._TEMPLATES).glob("*.html")}
+    assert "hits.html" in texts and 'content="width=device-width' in texts["report.html"]
+    for name, text in texts.items():
+        assert text.count("<table") == len(re.findall(r'<div class="scroll[^"]*"><table', text)), name

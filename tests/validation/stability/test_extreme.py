@@ -11,7 +11,7 @@ def case(error: Exception | None) -> ExtremeCase:
             raise error
         return Outcome("as expected", holds=True)
 
-    return ExtremeCase(0, "a test", "as expected", ("policy",), "exact", run)
+    return ExtremeCase(0, "a test", "as expected", ("rule",), "exact", run)
 
 
 def test_a_case_that_raises_does_not_hold_and_the_report_goes_on() -> None:

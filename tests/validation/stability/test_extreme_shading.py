@@ -202,6 +202,7 @@ def test_no_picture_holds_a_nan_or_inf(scene: Scene, max_depth: int, min_weight:
     )
 
 
+@pytest.mark.filterwarnings("ignore::renderer.SceneWarning")
 @pytest.mark.parametrize("ambient", [0.0, 1.0])
 def test_weights_that_overflow_make_no_nan(ambient: float) -> None:
     """Reflectances may exceed 1: after eleven bounces the weight is beyond float64, and 0 times it still 0 or more."""

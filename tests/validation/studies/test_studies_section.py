@@ -32,8 +32,8 @@ def test_all_gates_pass_and_the_record_draws_a_figure(run):
     assert all(row["asked"] > 0 for row in (*record["bits"], *record["corners"], *record["holds"]))
     assert (folder / section.PICTURE).stat().st_size > 10_000
     (figure,) = figures.studies_figures(record)
-    assert "N^-0.7" in figure["svg"] and "as by chance" in figure["svg"]
-    assert page.PARTIALS["studies"] == ("Studies", "studies.html")
+    assert "N^-0.7" in figure["svg"] and "random, N^-0.50" in figure["svg"]
+    assert page.PARTIALS["studies"].template == "studies.html"
 
 
 @pytest.mark.parametrize("name", ["sky_view_factor", "ambient_occlusion", "openness"])

@@ -58,7 +58,7 @@ def _scaled(index: Any, factor: Any) -> Callable[[Any], None]:
 
 
 def _moved_light(rows: Any) -> None:
-    rows[-1, 1] += 0.05
+    rows[-1:, 1] += 0.05
 
 
 def _packed(change: Callable[[Any], Any]) -> Wrapped:
@@ -123,7 +123,8 @@ def _depth_along_axis(sound: Any, prepared: Any, camera: Any, chosen: Any, *rest
 
     image, (width, height) = sound(prepared, camera, chosen, *rest, **options), chosen.resolution
     cosines = primary_rays(camera, width, height)[1] @ camera.frame()[2]
-    image.depth[...] *= cosines.reshape(height, width)
+    if image.depth.size:
+        image.depth[...] *= cosines.reshape(height, width)
     return image
 
 
@@ -216,7 +217,6 @@ _CHANGES: dict[str, Change] = {
     "highlights left out below R.V = 0.5": Rule("highlight-in-front", compare("<=", "0.5")),
     "interpolated normals not normalised": Rule("unit-shading-normal", call("normalized", "_0")),
     "rays leave a face from its other side": Rule("side-of-start", choice(then="-1", otherwise="1")),
-    "rays leave a face by a thousandth of the bound": Rule("move-off-face", operand("-", 0, "1e-3 * _")),
     "spawned rays start on their surface": Rule("spawn-offset", argument(1, "0.0 * _")),
     "the tint of glass lost": Rule("tint-of-glass", element(1, "(_[0], _[0], _[0])")),
     "all samples of a pixel at one place": after("sample_offsets", lambda places: np.full_like(places, 0.5)),

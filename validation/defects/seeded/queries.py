@@ -33,7 +33,7 @@ _CHANGES: dict[str, Change] = {
     "hits at one edge are contacts of their own": Rule("merge-at-edge", value("False")),
     "a corner is taken for one of its edges": Rule("corner-of-edges", value("False")),
     "of hits at one t the highest face comes first": Rule("order-at-t", compare(">", nth=2)),
-    "max_hits keeps one more": Rule("max-hits", call("minimum", "minimum(_0, _1 + 1)")),
+    "max_hits keeps one more": Rule("max-hits", call("minimum", "minimum(_0, _1 + (1 if _1 < 1000 else 0))")),
     "blocks of which a ray sees the first face alone are left out": Rule("seen-blocks", compare(">", "1")),
     "the nearest point is never a corner": Rule("nearest-corner", value("False")),
     "points beside an edge are taken as over the face": Rule("over-face", without("and", 2)),

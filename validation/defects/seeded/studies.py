@@ -1,5 +1,6 @@
 """Defects of studies."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -33,8 +34,8 @@ def _without_room(sound: Any, tree: Any, mesh: Any, points: Any, room: Any, thre
     return sound(tree, mesh, points, 0.0 * room, threads)
 
 
-def _on_first_face(chosen: Any) -> Any:
-    return chosen._replace(points=chosen.points._replace(faces=np.zeros_like(chosen.points.faces)))
+def _turned_over(chosen: Any) -> Any:
+    return replace(chosen, points=replace(chosen.points, normals=-chosen.points.normals))
 
 
 _CHANGES: dict[str, Change] = {
@@ -43,7 +44,7 @@ _CHANGES: dict[str, Change] = {
     "bits stand the other way round in their bytes": after("share.evaluate_bits", _mirrored_bytes),
     "rays of studies leave a face on its other side": Rule("side-of-study-ray", compare("<")),
     "the whole is without what the horizon hides": Rule("cosine-weight", call("abs", "max(_0, 0.0)")),
-    "a list of leaves lacks its last one": Rule("end-of-leaf-list", argument(1, "max(_ - 1, 0)")),
+    "a list of leaves lacks its last one": Rule("end-of-leaf-list", argument(1, "_ - 1 if _ % 8 > 1 else _")),
     "the leaf that hid a ray hides the next one unasked": Rule("hider-is-tested", value("True")),
     "patches weigh the same at all heights": Rule("cosine-of-patches", value("False")),
     "distances in units of the directions": Wrapped("share.limits_of", _limits_in_directions),
@@ -56,7 +57,7 @@ _CHANGES: dict[str, Change] = {
     "faces around a corner at the rim count as closed": Rule("closed-fan", argument(2, "1.0")),
     "points that rounding put off the surface are not on it": Wrapped("on_surface.closest_point", _without_room),
     "a scanner on a roof stands below it": Rule("outer-side-of-scanner", choice(then="-_")),
-    "points of a file lie on the first face": after("of_file", _on_first_face),
+    "points of a file look the other way": after("of_file", _turned_over),
     "faces that hold the beginning of a view hide its end": Wrapped(
         "visible.offset_origins", lambda sound, rays, *rest: rays
     ),

@@ -33,7 +33,7 @@ def check_alone(rng: Generator) -> list[dict[str, Any]]:
             alone = octree.closest_hit(origins[k], directions[k])
             same = [_equal(getattr(alone, name), getattr(together, name)[k]) for name in ("t", "face", "u", "v")]
             kept.append(all(same) and hidden[k] == alone.hit)
-    return [row("a ray has the same bits in any batch", "the ray alone", np.array(kept))]
+    return [row("a ray gives the same bits in any batch", "single ray", np.array(kept))]
 
 
 def _equal(one: NDArray[Any], other: NDArray[Any]) -> bool:

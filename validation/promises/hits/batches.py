@@ -30,9 +30,7 @@ def check_batches(sizes: tuple[int, ...] = SIZES) -> list[dict[str, Any]]:
     for size, stride, octree in product(sizes, (1, _STRIDE), octrees):
         for name, kept in _answers(octree, np.arange(size) * stride).items():
             found.setdefault(name, []).append(kept)
-    return [
-        row(f"batches of any size: {name}", "a grid of squares", np.concatenate(kept)) for name, kept in found.items()
-    ]
+    return [row(f"batches of any size: {name}", "known answer", np.concatenate(kept)) for name, kept in found.items()]
 
 
 def _answers(octree: Octree, number: NDArray[np.int64]) -> dict[str, NDArray[np.bool_]]:
@@ -102,9 +100,9 @@ def check_refits() -> list[dict[str, Any]]:
         octree.refit(mesh.vertices * size)
         sizes += [_meets_all(octree, mesh.vertices * size, along, size) for along in range(3)]
     return [
-        *(row(f"a refit along {name}, growing, shrinking and moving", "a lattice of squares", np.concatenate(kept))
+        *(row(f"a refit along {name}, growing, shrinking and moving", "known answer", np.concatenate(kept))
           for name, kept in found.items()),
-        row("a refit to sizes that the tree counts in other units", "a lattice of squares", np.concatenate(sizes)),
+        row("a refit to sizes that the tree counts in other units", "known answer", np.concatenate(sizes)),
     ]  # fmt: skip
 
 

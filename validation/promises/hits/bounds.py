@@ -52,10 +52,10 @@ def check_bounds(rng: Generator, count: int) -> list[dict[str, Any]]:
             return kept
 
         kept = asked(ask, octree, brute, count)
-        found.append(row(f"[t_min, t_max] is closed: {name}", "planes at whole 64ths", kept))
+        found.append(row(f"[t_min, t_max] is closed: {name}", "dyadic planes", kept))
     return [
         *found,
-        row("a t_min above 0, however small, leaves out a hit at 0", "planes at whole 64ths", _started(count)),
+        row("a t_min above 0, however small, leaves out a hit at 0", "dyadic planes", _started(count)),
     ]
 
 

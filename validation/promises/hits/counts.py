@@ -38,10 +38,10 @@ def check_counts(rng: Generator) -> list[dict[str, Any]]:
         steps = brute.count_steps(rng.normal(size=(20, 3)), rng.normal(size=(20, 3)))
         tested.append((steps.triangles == count) & (steps.nodes == 0))
     return [
-        row("stats counts the leaves that hold faces", "the tree's arrays, read again", np.array(leaves)),
-        row("from_mesh builds with the options that it is given", "the tree of the arrays", _same(rng)),
-        row("a ray that hits nothing takes the boxes that it enters", "slabs of the tree's boxes", _entered(rng)),
-        row("brute force tests each face once and no padding", "the number of faces", np.concatenate(tested)),
+        row("stats counts the leaves that hold faces", "recount of the tree", np.array(leaves)),
+        row("from_mesh builds with the options that it is given", "tree built from arrays", _same(rng)),
+        row("a ray that hits nothing visits the boxes that it enters", "slab tests", _entered(rng)),
+        row("brute force tests each face once and no padding", "known answer", np.concatenate(tested)),
     ]
 
 

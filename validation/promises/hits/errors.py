@@ -36,11 +36,11 @@ def check_errors(rng: Generator) -> list[dict[str, Any]]:
         for tracer in (Octree.from_mesh(scaled), BruteForce.from_mesh(scaled)):
             kept += [_bounded(tracer, np.ldexp(heights, size), math.ldexp(3.0, size - time)) for time in times]
     return [
-        row("t_error bounds the error of t, of denormal t too", "quotients in whole numbers", np.concatenate(kept)),
-        row("t_error is that of the hit's own ray", "quotients in whole numbers", _own()),
+        row("t_error bounds the error of t, also of denormal t", "integer arithmetic", np.concatenate(kept)),
+        row("t_error belongs to the hit's own ray", "integer arithmetic", _own()),
         row(
             "t_error of a ray in a face's plane reaches to both ends of its box, and not beyond",
-            "whole numbers",
+            "integer arithmetic",
             _along(rng),
         ),
     ]

@@ -12,7 +12,7 @@ from renderer.mesh.load import load_mesh
 from renderer.mesh.mesh import Mesh
 from validation.promises.row import row
 
-_JUDGE = "meshes by hand"
+_JUDGE = "known answer"
 # Lines of few are read one by one, many at once.
 _SIZES = (4, 800)
 _PLY = {"uchar": 255.0, "ushort": 65535.0, "uint": 4294967295.0, "float": 1.0, "double": 1.0}
@@ -48,9 +48,9 @@ def check_files(rng: Generator) -> list[dict[str, Any]]:
             row("an OBJ file's corners with other normals or coordinates are other vertices", _JUDGE, _split(folder)),
             row("an OBJ file's normals are kept where each corner of each face has one", _JUDGE, _normals(folder)),
             row("an OBJ file's corners without texture coordinates get (0, 0)", _JUDGE, _texcoords(folder)),
-            row("every second triangle of a PLY strip is turned, after a restart too", _JUDGE, _strips(folder)),
-            row("an index below 0 in an OBJ file counts back from its face", "places by hand", _back(folder, rng)),
-            row("colours of a PLY file are shares of the largest of their type", "shares by hand", _shares(folder)),
+            row("every second triangle of a PLY strip is flipped, also after a restart", _JUDGE, _strips(folder)),
+            row("an index below 0 in an OBJ file counts back from its face", "known answer", _back(folder, rng)),
+            row("colours of a PLY file are shares of the largest of their type", "known answer", _shares(folder)),
         ]
 
 

@@ -17,7 +17,7 @@ from renderer.octree import BruteForce, Octree
 from validation.promises.refused import refuses
 from validation.promises.row import row
 
-_JUDGE = "the arrays that were given"
+_JUDGE = "input arrays"
 _ARRAYS = ("vertices", "faces", "normals", "colors", "texcoords")
 # So large and small that the tree counts in units of its own.
 _SIZES = (1.0, 2.0**200, 2.0**-200)
@@ -38,11 +38,11 @@ def check_kept(rng: Generator) -> list[dict[str, Any]]:
         row("a mesh that is copied or pickled keeps every array", _JUDGE, np.array(copies)),
         row("a loaded tree's mesh has all that the saved one had", _JUDGE, np.array(loaded)),
         row("a refit keeps normals, colours and texture coordinates", _JUDGE, np.array(moved)),
-        row("a loaded tree gives the bits of the saved one, in any units", "the tree before it was saved", _asked(rng)),
-        row("damage anywhere in a stored tree is noticed", "a bit that was turned", _damaged(rng)),
-        row("a loaded tree has the repairs and counts of the one that was saved", "meshes by hand", _repaired()),
-        row("a tree does not change with arrays that were made writable", "a face by hand", _writable()),
-        row("files of other lengths, versions and orders of bytes are refused", "the file that was saved", _other(rng)),
+        row("a loaded tree gives the bits of the saved one, in any units", "saved tree", _asked(rng)),
+        row("damage anywhere in a stored tree is detected", "flipped bits", _damaged(rng)),
+        row("a loaded tree has the repairs and counts of the one that was saved", "known answer", _repaired()),
+        row("a tree does not change with arrays that were made writable", "known answer", _writable()),
+        row("files of other lengths, versions and orders of bytes are refused", "saved file", _other(rng)),
     ]
 
 

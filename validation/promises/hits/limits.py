@@ -11,7 +11,7 @@ from validation.promises.row import row
 
 # Powers of two of directions: those that are taken at last and those that are refused next.
 _SHORTEST, _LONGEST = -300, 700
-_JUDGE = "powers of two by hand"
+_JUDGE = "closed form"
 _CORNERS = np.array([(-1.0, -1.0, 0.0), (3.0, -1.0, 0.0), (-1.0, 3.0, 0.0)])
 # One ray alone, some, and packets.
 _BATCHES = (1, 9, 64)
@@ -27,7 +27,7 @@ def check_limits() -> list[dict[str, Any]]:
             lengths += [refuses(usual.closest_hit, *_rays(1.0, long, count)) for long in _beyond()]
             overflows += [_met(huge, power, count) for power in (-120, -123, -124, -125, -200, -250)]
     return [
-        row("directions are taken from 2^-300 to 2^700 long, ends included", _JUDGE, np.array(lengths)),
+        row("directions may be from 2^-300 to 2^700 long, ends included", _JUDGE, np.array(lengths)),
         row("a face that only an infinite t would reach is not hit", _JUDGE, np.array(overflows)),
     ]
 

@@ -28,7 +28,7 @@ _FRAMES = np.array([
     [(1, 0, 0), (0, 1, 0)], [(0, 0, 1), (0, 1, 0)], [(0, 1, 0), (0, 0, 1)], [(0, 0, 1), (1, 0, 0)],
     [(1, 2, 2), (2, 1, -2)], [(2, 1, -2), (2, -2, 1)], [(-2, 2, -1), (2, 1, -2)], [(3, -4, 0), (0, 0, 5)],
 ])  # fmt: skip
-_JUDGE = "whole numbers"
+_JUDGE = "integer arithmetic"
 
 
 def check_outlines(rng: Generator, count: int) -> list[dict[str, Any]]:
@@ -52,7 +52,7 @@ def check_outlines(rng: Generator, count: int) -> list[dict[str, Any]]:
         kept.append((cut == fan).all(axis=(1, 2))[~notched])
     return [
         row("triangles cover a notched polygon once, wound as it is", _JUDGE, np.concatenate(covered)),
-        row("a polygon keeps its fan where that or nothing is right", _JUDGE, np.concatenate(kept)),
+        row("a polygon keeps its fan where the fan is right or nothing is", _JUDGE, np.concatenate(kept)),
     ]
 
 

@@ -18,7 +18,7 @@ _LEAST_SINE = 0.1
 # 2^10 units of the last place of u, v and of the largest coordinate: what remains of rounding at that sine and in faces
 # a hundredth as high as wide. What is wrong differs by 2^-30 and more.
 _NEAR = 2.0**-43
-_JUDGE = "whole numbers"
+_JUDGE = "integer arithmetic"
 
 
 class _Exact(NamedTuple):
@@ -55,8 +55,8 @@ def check_places(rng: Generator, count: int) -> list[dict[str, Any]]:
     rows_ = [row(what, _JUDGE, np.concatenate(kept)) for what, kept in found.items()]
     return [
         *rows_,
-        row("each ray at a face meets one", _JUDGE, met),
-        row("normals of faces of any size have unit length", "the z axis", _sized()),
+        row("each ray aimed at a face hits one", _JUDGE, met),
+        row("normals of faces of any size have unit length", "closed form", _sized()),
     ]
 
 
@@ -75,9 +75,9 @@ def _judged(who: Any, exact: _Exact, size: float) -> dict[str, NDArray[np.bool_]
         return kept
 
     return {
-        "t tells the way in units of the direction": near(who.t, exact.t),
-        "u and v weigh the face's second and third corner": near(who.u, exact.u) & near(who.v, exact.v),
-        "points are where the rays meet the faces": near(who.points, exact.point, size),
+        "t is the distance in units of the direction": near(who.t, exact.t),
+        "u and v are the weights of a face's second and third corner": near(who.u, exact.u) & near(who.v, exact.v),
+        "points are where the rays hit the faces": near(who.points, exact.point, size),
         "normals have unit length and follow the winding": near(who.normals, exact.normal),
     }
 

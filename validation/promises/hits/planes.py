@@ -24,7 +24,7 @@ def check_planes() -> list[dict[str, Any]]:
     for eye in _EYES:
         directions = _targets() - eye
         kept += [octree.any_hit(eye, directions), octree.closest_hit(eye, directions).hit]
-    return [row("no ray passes through a plane of many faces, from afar", "a plane is whole", np.concatenate(kept))]
+    return [row("no ray from afar passes through a plane of many faces", "closed form", np.concatenate(kept))]
 
 
 def _targets() -> NDArray[np.float64]:

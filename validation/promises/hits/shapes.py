@@ -34,8 +34,8 @@ def check_shapes(rng: Generator) -> list[dict[str, Any]]:
                 rays += _kept(tracer, origins, directions, bounds)
         near += [kept for order in _ORDERS for kept in _near(tracer, rng, order)]
     return [
-        row("rays of any shape and memory order go with their indices", "each ray alone", np.array(rays)),
-        row("points of any shape and memory order have their own limits", "each point alone", np.array(near)),
+        row("rays of any shape and memory order keep their own answers", "single ray", np.array(rays)),
+        row("points of any shape and memory order keep their own limits", "single point", np.array(near)),
     ]
 
 

@@ -29,9 +29,9 @@ def check_starts(rng: Generator) -> list[dict[str, Any]]:
         again = found.ray[found.face == face[found.ray]]
         kept.append(~np.isin(np.arange(len(face)), again))
     return [
-        row("a ray does not meet the face that it leaves, however thin", "which face it is", np.concatenate(kept)),
-        row("each query leaves a face", "a single face", _alone()),
-        row("a ray from the foot of a wall through the wall is stopped at once", "which face it is", _feet(rng)),
+        row("a ray does not hit the face that it leaves, however thin", "known answer", np.concatenate(kept)),
+        row("each query leaves the face named by leaving", "known answer", _alone()),
+        row("a ray from the foot of a wall through the wall is stopped at once", "known answer", _feet(rng)),
     ]
 
 

@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 _MANY = 30_000
 # By this share of its width a face's box is wider than the face, on each side.
 _ROOM = 2.0**-21
-_JUDGE = "the tree's arrays, read again"
+_JUDGE = "recount of the tree"
 
 
 def check_trees(rng: Generator) -> list[dict[str, Any]]:
@@ -32,7 +32,7 @@ def check_trees(rng: Generator) -> list[dict[str, Any]]:
             found.setdefault(promise, []).append(kept)
     return [
         *(row(promise, _JUDGE, np.concatenate(kept)) for promise, kept in found.items()),
-        row("blocks are float32 only where that holds every vertex", "meshes by hand", _digits()),
+        row("blocks are float32 only where that holds every vertex", "known answer", _digits()),
     ]
 
 
@@ -74,7 +74,7 @@ def _judged(tree: Tree, mesh: Mesh) -> dict[str, Bools]:
         "a node's box is that of its octants": _unites(found),
         "each node is reached once": np.bincount(links[~ends], minlength=len(where))[1:] == 1,
         "an octant without faces is empty": _is_empty(every[unused], where[unused], len(tree.faces) // 4),
-        "words of nodes that nothing uses are 0": (tree.nodes.reshape(-1, 64)[:, 56:] == 0.0).all(axis=1),
+        "unused words of nodes are 0": (tree.nodes.reshape(-1, 64)[:, 56:] == 0.0).all(axis=1),
         "a node but the first has two octants or more": (~unused).sum(axis=1)[1:] > 1,
         "the depth is the number of levels": np.array([tree.depth == len(found)]),
         "blocks hold their faces' corners": _holds(tree, mesh),

@@ -42,16 +42,16 @@ def check_bounces() -> list[dict[str, Any]]:
     found = []
     for name, scene in (("between two mirrors", _mirrors()), ("through panes", _panes())):
         kept = [_kept(scene, depth, 0.0) for depth in _DEPTHS]
-        found.append(row(f"max_depth bounces are followed, {name}", "the sum of the weights", np.concatenate(kept)))
+        found.append(row(f"max_depth bounces are followed, {name}", "closed form", np.concatenate(kept)))
         kept = [_kept(scene, 20, bound) for bound in _BOUNDS]
         promise = f"a ray ends where its largest weight is below min_weight, {name}"
-        found.append(row(promise, "the sum of the weights", np.concatenate(kept)))
-    found.append(row("a prepared scene is drawn at any max_depth", "the sum of the weights", _prepared()))
+        found.append(row(promise, "closed form", np.concatenate(kept)))
+    found.append(row("a prepared scene is drawn at any max_depth", "closed form", _prepared()))
     glass = "glass that lets no light through reflects Fresnel's share"
     return [
         *found,
-        row(glass, "Fresnel's formula at 0 degrees", _black_glass()),
-        row("rays are counted, and none is traced that shows nothing", "counted by hand", _counted()),
+        row(glass, "Fresnel's formula", _black_glass()),
+        row("rays are counted, and none that shows nothing is traced", "known answer", _counted()),
     ]
 
 

@@ -30,7 +30,7 @@ def check_cameras(rng: Generator, count: int) -> list[dict[str, Any]]:
             near = np.abs(image.depth - expected) <= _ROUNDING * expected
         kept[camera.type].append((near | (image.depth == expected)).ravel())
     return [
-        row(f"the depth that each pixel of a camera sees, {kind}", "OpenGL's matrices, inverted", np.concatenate(found))
+        row(f"the depth that each pixel of a camera sees, {kind}", "OpenGL's matrices", np.concatenate(found))
         for kind, found in kept.items()
     ]
 

@@ -24,8 +24,8 @@ def check_codes() -> list[dict[str, Any]]:
     first = np.array([_first(below[i], above[i], codes[i]) for i in range(255)])
     expected = np.tile(codes - 1, 3) + (single.astype(np.float64) >= np.tile(first, 3))
     return [
-        row("sRGB codes begin where the standard's formula says", "IEC 61966-2-1 in whole numbers", wide),
-        row("float32 numbers get the codes of the same float64", "the first float64 of each code",
+        row("sRGB codes begin where the standard's formula says", "integer arithmetic", wide),
+        row("float32 numbers get the codes of the same float64", "known answer",
             srgb(single.astype(np.float32)) == expected),
     ]  # fmt: skip
 

@@ -25,8 +25,8 @@ def check_floors() -> list[dict[str, Any]]:
         for k in (2, 3, 5)
     ]
     return [
-        row("a floor's squares take its materials in turn, from min", "the square of each position", _joined(parity)),
-        row("samples lie on a k x k grid in the pixel; its colour is their mean", "counted squares", _joined(samples)),
+        row("a floor's squares take its materials in turn, from min", "closed form", _joined(parity)),
+        row("samples lie on a k x k grid in the pixel; its colour is their mean", "direct count", _joined(samples)),
     ]
 
 

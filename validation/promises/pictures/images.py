@@ -30,19 +30,19 @@ _ROUNDING = 1e-14
 def check_images(rng: Generator) -> list[dict[str, Any]]:
     """Squares from above, of which one is seen from its back, and one covers half of the picture."""
     checks: dict[tuple[str, str], Callable[[], Bools]] = {
-        ("a picture's normals are those of the winding, whichever side is seen", "a square"): _sides,
-        ("a picture counts the rays of all samples of a pixel", "the number of samples"): _samples,
-        ("only surfaces that show direct light send shadow rays", "the kinds of materials"): _shadowed,
-        ("what render is given counts before what the scene says, 0 and False too", "the sum of the light"): _given,
-        ("pixels are cut where max_rays ends what would go on, and nowhere else", "two mirrors"): _cut,
-        ("a picture's faces are those of the objects joined, in one plane too", "squares by number"): _faces,
-        ("a floor faces up, from wherever it is seen", "its normal"): _floor,
-        ("each plane that is asked for is kept, whatever others are", "the picture with all planes"): _some,
-        ("smooth objects have the normals of their files", "the normals that were given"): _smooth,
-        ("a light's direction has no length", "irradiance by hand"): _lengths,
+        ("a picture's normals are those of the winding, whichever side is seen", "known answer"): _sides,
+        ("a picture counts the rays of all samples of a pixel", "direct count"): _samples,
+        ("only surfaces that show direct light send shadow rays", "known answer"): _shadowed,
+        ("arguments of render override the scene, also 0 and False", "closed form"): _given,
+        ("pixels are marked as cut exactly where max_rays ended their rays", "known answer"): _cut,
+        ("a picture's faces are those of the objects joined, also in one plane", "known answer"): _faces,
+        ("a floor faces up, from wherever it is seen", "known answer"): _floor,
+        ("each requested plane is kept, whatever the others are", "full picture"): _some,
+        ("smooth objects have the normals of their files", "input arrays"): _smooth,
+        ("the length of a light's direction does not matter", "closed form"): _lengths,
     }
     found = [row(promise, judge, check()) for (promise, judge), check in checks.items()]
-    return [*found, row("vertex normals weigh faces by their angles", "trimesh's weights", _weighed(rng))]
+    return [*found, row("vertex normals weigh faces by their angles", "trimesh", _weighed(rng))]
 
 
 def _ground(up: bool = True) -> Mesh:

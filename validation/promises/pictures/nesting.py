@@ -35,11 +35,11 @@ def check_nesting() -> list[dict[str, Any]]:
     within = [_kept(pile, tuple(range(len(pile)))[::-1], _WITHIN) for pile in _AROUND]
     turned = [_kept(pile, tuple(range(len(pile)))[::-1], _WITHIN, _ABOVE) for pile in _AROUND]
     return [
-        row(promise, "Snell's law, slab by slab", np.concatenate(kept)),
-        row("an eye within media is in the innermost of them", "Snell's law, slab by slab", np.concatenate(within)),
+        row(promise, "Snell's law", np.concatenate(kept)),
+        row("an eye within media is in the innermost of them", "Snell's law", np.concatenate(within)),
         row(
-            "so is another camera's, whatever the scene's is in",
-            "Snell's law, slab by slab",
+            "another camera starts in its own media, whatever the scene's camera is in",
+            "Snell's law",
             np.concatenate(turned),
         ),
     ]

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 _FACES = 120
 # So small that the build scales the vertices, by a power of two.
 _TINY = 2.0**-200
-_JUDGE = "plain arithmetic"
+_JUDGE = "direct computation"
 
 
 class _Octant(NamedTuple):
@@ -46,7 +46,7 @@ def check_openings(rng: Generator, count: int) -> list[dict[str, Any]]:
                 given = visited(octree, unit * origin, unit * direction, t_max)
                 opened.append(_are(given, _visits(root, origin, direction, t_max)[0], unit))
     return [
-        row("a ray opens the boxes up to its best hit, the nearest first", _JUDGE, np.array(opened)),
+        row("a ray opens the boxes up to its closest hit, the nearest first", _JUDGE, np.array(opened)),
         row("each level shows the boxes of its octants", _JUDGE, np.array(shown)),
     ]
 

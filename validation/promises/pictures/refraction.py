@@ -23,7 +23,7 @@ def check_refraction(rng: Generator, count: int) -> list[dict[str, Any]]:
         cosine = np.sin(beside)
         found = refract((float(np.cos(beside)), 0.0, float(-cosine)), (0.0, 0.0, 1.0), 1.0, float(n2))[0]
         kept.append(abs(found - _exact(float(cosine), float(n2))) <= _ROUNDING * found)
-    return [row("the cosine of refracted light keeps its digits", "Snell's law in 60 digits", np.array(kept))]
+    return [row("the cosine of refracted light keeps its digits", "60-digit arithmetic", np.array(kept))]
 
 
 def _exact(cosine: float, n2: float) -> float:

@@ -25,9 +25,9 @@ def check_saved() -> list[dict[str, Any]]:
     """A square that covers half of the picture."""
     half = square(np.array([0.0, 0.0, -4.0]), _ACROSS, _ALONG)
     return [
-        row("a picture is saved as the kind of file that its suffix names", "the first bytes of each kind",
+        row("a picture is saved as the kind of file that its suffix names", "file signatures",
             _kinds(half)),
-        row("an EXR file has the depth, infinite where nothing is", "OpenEXR's reader", _depth(half)),
+        row("an EXR file has the depth, infinite where nothing is", "OpenEXR", _depth(half)),
     ]  # fmt: skip
 
 

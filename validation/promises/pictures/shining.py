@@ -34,11 +34,15 @@ def check_shining() -> list[dict[str, Any]]:
             )  # fmt: skip
             kept.append(equal(shown(scene, (1, 1)), expected).ravel())
     return [
-        row("a light of any one colour shines, beside dark ones", "irradiance by hand", np.concatenate(kept)),
-        row("highlights of the largest exponents keep their width", "cos^k by hand", _narrow(ground)),
-        row("where smooth normals cancel the face's own counts", "irradiance by hand", _flat(ground)),
-        row("light beyond float64 leaves a dark channel dark, and is the largest float32", "by hand", _endless(ground)),
-        row("what a lamp stands on does not hide it", "every place below it is lit", _lamps(ground)),
+        row("a light of any one colour shines, beside dark ones", "closed form", np.concatenate(kept)),
+        row("highlights of the largest exponents keep their width", "closed form", _narrow(ground)),
+        row("where smooth normals cancel, the face's own is used", "closed form", _flat(ground)),
+        row(
+            "light beyond float64 leaves a dark channel dark, and is the largest float32",
+            "known answer",
+            _endless(ground),
+        ),
+        row("what a lamp stands on does not hide it", "known answer", _lamps(ground)),
     ]
 
 

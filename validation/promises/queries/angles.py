@@ -16,7 +16,7 @@ from validation.promises.queries.heaps import heaps
 from validation.promises.row import row
 
 Floats = NDArray[np.float64]
-_JUDGE = "solid angles in whole numbers"
+_JUDGE = "integer arithmetic"
 # Bits of a length behind the whole number's. What tells an angle is as small as the square of the least distance, so
 # these are more than there are between two sizes of float64.
 _BITS = 1200
@@ -91,7 +91,7 @@ def check_halves(rng: Generator) -> list[dict[str, Any]]:
         exact = np.array([turns(point, _large(axis)) for point in points])
         near += [np.abs(octree.winding_number(points, most) - exact) <= most for most in _TOLERANCES]
     return [
-        row("inside a mesh with a hole the winding number is above 1/2", "a cube without a lid", np.concatenate(sides)),
+        row("inside a mesh with a hole the winding number is above 1/2", "closed form", np.concatenate(sides)),
         row("winding numbers are within any tolerance", _JUDGE, np.concatenate(near)),
     ]
 

@@ -33,10 +33,10 @@ def check_inside(rng: Generator) -> list[dict[str, Any]]:
                 asked.contains(points, boundary=False) == ((winding != 0) & ~on),
                 asked.contains(points, boundary=False, rule="even-odd") == ((winding % 2 == 1) & ~on),
             ]
-    promise = "inside is told exactly, whatever the sizes of coordinates"
+    promise = "inside is exact, whatever the sizes of coordinates"
     return [
-        row(promise, "each tetrahedron in whole numbers", np.concatenate(found)),
-        row("points a float32 step or less beside a flat side are told apart", "the box's ends", _slabs(rng)),
+        row(promise, "integer arithmetic", np.concatenate(found)),
+        row("points a float32 step or less beside a flat side are distinguished", "closed form", _slabs(rng)),
     ]
 
 

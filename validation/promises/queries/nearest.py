@@ -16,7 +16,7 @@ from validation.promises.queries.heaps import heaps
 from validation.promises.row import row
 
 Floats = NDArray[np.float64]
-_JUDGE = "each face in whole numbers"
+_JUDGE = "integer arithmetic"
 # The exact distance, rounded: half an ulp, and as little more as twice the digits leave. Where it is 2^-64 of the
 # farthest corner's or less it may be off by 2^-90 of that.
 _ULPS, _NEAR, _BESIDE = 0.51, 2.0**-64, 2.0**-90
@@ -62,9 +62,9 @@ def check_nearest(rng: Generator) -> list[dict[str, Any]]:
         shell.append(_kept(Octree.from_mesh(loose(faces)), faces, np.zeros((1, 3))))
     return [
         row("the nearest face and its distance, whatever the sizes of coordinates", _JUDGE, np.concatenate(heap)),
-        row("the nearest of faces that are as near but for some ulp", _JUDGE, np.concatenate(shell)),
-        row("of two faces whose edge is nearest the lower has it", "wedges of two faces", _edges_kept(rng)),
-        row("beyond max_distance nothing is told", "distances to a plane", _beyond(rng)),
+        row("the nearest of faces whose distances differ by some ulp", _JUDGE, np.concatenate(shell)),
+        row("of two faces whose common edge is nearest, the lower is reported", "known answer", _edges_kept(rng)),
+        row("beyond max_distance nothing is reported", "closed form", _beyond(rng)),
     ]
 
 

@@ -13,7 +13,7 @@ from renderer.results.hits import AllHits
 from validation.promises.row import row
 
 Floats = NDArray[np.float64]
-_JUDGE = "piles of fans at whole heights"
+_JUDGE = "known answer"
 # Fans of a pile, and how often each ray comes. A ray meets fewer blocks than are listed for it, as many, some more, and
 # so many that its hits need more memory; some rays are more than are searched for together.
 _PILES = ((1, 1), (16, 2), (33, 17), (250, 1))

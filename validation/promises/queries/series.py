@@ -21,7 +21,7 @@ from validation.meshes import loose
 from validation.promises.row import row
 
 Floats = NDArray[np.float64]
-_JUDGE = "the solid angles of all faces"
+_JUDGE = "direct sums"
 # The order of the series. Groups stand so far apart, in units of their size, that others hardly count.
 _ORDER = 6
 _APART = 4096.0
@@ -48,8 +48,8 @@ def check_series(rng: Generator) -> list[dict[str, Any]]:
     found = [_series_kept(rng, *kind) for kind in _FACES]
     near, told = (np.concatenate(one) for one in zip(*found, strict=True))
     return [
-        row("a series errs by what higher orders tell at most", _JUDGE, near),
-        row("an octant has the radius, the size and the spread of its faces", "sums over their corners", told),
+        row("a series errs by no more than the bound of higher orders", _JUDGE, near),
+        row("an octant has the radius, the size and the spread of its faces", "direct sums", told),
         *_bounds(rng),
     ]
 
@@ -91,8 +91,8 @@ def _bounds(rng: Generator) -> list[dict[str, Any]]:
     found = [_bounds_kept(rng, copies, leaf_size) for copies, leaf_size in _LINES]
     kept, asked = (np.concatenate(one) for one in zip(*found, strict=True))
     return [
-        row("the bound of a series is its error at worst, and no more", _JUDGE, kept),
-        row("a series is asked where its bound is within the share, and else not", _JUDGE, asked),
+        row("the bound of a series is its worst error, and no more", _JUDGE, kept),
+        row("a series is used exactly where its bound is within the share", _JUDGE, asked),
     ]
 
 

@@ -11,7 +11,7 @@ from renderer.octree import BruteForce, Octree
 from validation.promises.row import row
 
 _COUNT = 3000
-_JUDGE = "the closed form of a box"
+_JUDGE = "closed form"
 
 
 def check_signed(rng: Generator) -> list[dict[str, Any]]:
@@ -36,7 +36,7 @@ def check_signed(rng: Generator) -> list[dict[str, Any]]:
     by_rule = [octree.signed_distance(both) == [-0.5, -0.5, -0.5, 0.5],
                octree.signed_distance(both, rule="even-odd") == [0.5, -0.5, -0.5, 0.5]]  # fmt: skip
     return [
-        row("the rule tells the sign where boxes overlap", _JUDGE, np.concatenate(by_rule)),
+        row("the rule decides the sign where boxes overlap", _JUDGE, np.concatenate(by_rule)),
         row("a signed distance is below 0 within, 0 on the surface, above 0 outside", _JUDGE, np.concatenate(plain)),
         row("beyond its limit a signed distance is infinite, with its sign", _JUDGE, np.concatenate(cut)),
     ]

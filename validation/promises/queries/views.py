@@ -34,15 +34,15 @@ def check_views(rng: Generator) -> list[dict[str, Any]]:
     return [
         row(
             "a ball's centre and each point of its surface see each other",
-            "a ball is convex",
+            "closed form",
             np.concatenate(seen),
         ),
-        row("nothing is seen through a ball", "a ball is closed", np.concatenate(hidden)),
-        row("what is in front of a face, however near, hides what stands on it", "planes by hand", _covered()),
-        row("each pair of points has the room of its own coordinates", "a square by hand", _far()),
-        row("what is nearer to an end than 2^-40 of both ends' coordinates hides nothing", "a square by hand", _room()),
-        row("a point sees what is in its own place", "nothing lies between", _same(rng)),
-        row("corners at 0.0 and -0.0 are at one place", "a box is closed", _closed()),
+        row("nothing is seen through a ball", "closed form", np.concatenate(hidden)),
+        row("what is in front of a face, however near, hides what stands on it", "known answer", _covered()),
+        row("each pair of points has the margin of its own coordinates", "known answer", _far()),
+        row("what is nearer to an end than 2^-40 of both ends' coordinates hides nothing", "known answer", _room()),
+        row("a point sees points at its own place", "known answer", _same(rng)),
+        row("corners at 0.0 and -0.0 are at one place", "closed form", _closed()),
     ]
 
 

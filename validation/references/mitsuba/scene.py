@@ -100,7 +100,8 @@ def in_float32(scene: Scene) -> Scene:
 
     A mesh whose shape does not survive that stays as it is, see ``VERTEX_ROUNDING``.
     """
-    return scene.altered(instances=tuple(replace(i, mesh=_in_float32(i.mesh)) for i in scene.instances))
+    rounded = tuple(replace(i, mesh=_in_float32(i.mesh)) for i in scene.instances)
+    return scene.model_copy(update={"instances": rounded})
 
 
 def _in_float32(mesh: Mesh) -> Mesh:

@@ -341,14 +341,14 @@ CASES: tuple[ExtremeCase, ...] = (
     ),
     ExtremeCase(
         21, "200,000 coincident triangles", "the build ends, references = faces, t right, face 0",
-        ("Embree", "policy"), "none: all numbers are exact", _coincident,
+        ("Embree", "rule"), "none: all numbers are exact", _coincident,
     ),
     ExtremeCase(
         22, "fan of 100,000 triangles at one vertex", "references = faces, no 8^depth; as brute force",
         ("brute force",), "none: bit for bit", _fan,
     ),
     ExtremeCase(
-        23, "1,000 faces within 2 ulp at 1e6", "the build ends", ("policy", "brute force"), "none: bit for bit",
+        23, "1,000 faces within 2 ulp at 1e6", "the build ends", ("rule", "brute force"), "none: bit for bit",
         _tiny_bounds,
     ),
     ExtremeCase(
@@ -357,21 +357,21 @@ CASES: tuple[ExtremeCase, ...] = (
     ),
     ExtremeCase(
         25, "triangles without area, repeated indices", "hit only where corners lie on a line, by rays at that line",
-        ("Embree", "policy"), "1e-9 from ray and line: a line may fill a slit between its neighbours",
+        ("Embree", "rule"), "1e-9 from ray and line: a line may fill a slit between its neighbours",
         _without_area,
     ),
     ExtremeCase(
         26, "NaN or infinite vertex beside a good triangle",
-        "ValueError that names the vertex; repaired: the bad face dropped and reported", ("policy",), "none",
+        "ValueError that names the vertex; repaired: the bad face dropped and reported", ("rule",), "none",
         _not_finite,
     ),
-    ExtremeCase(27, "index 99, 3 or -1 of 3 vertices", "ValueError", ("policy",), "none", _out_of_range),
-    ExtremeCase(28, "mesh without faces", "all miss", ("Embree", "policy"), "none", _empty),
+    ExtremeCase(27, "index 99, 3 or -1 of 3 vertices", "ValueError", ("rule",), "none", _out_of_range),
+    ExtremeCase(28, "mesh without faces", "all miss", ("Embree", "rule"), "none", _empty),
     ExtremeCase(
         29, "one triangle, flat bounds", "hit", ("exact",), "the derived bound of t", _single
     ),
     ExtremeCase(
-        30, "each face 10 times, shuffled", "t bit-equal, lowest face", ("policy",), "none: bit for bit", _duplicates
+        30, "each face 10 times, shuffled", "t bit-equal, lowest face", ("rule",), "none: bit for bit", _duplicates
     ),
     ExtremeCase(
         31, "an edge with 5 faces; an open mesh", "as brute force", ("brute force",), "none: bit for bit",

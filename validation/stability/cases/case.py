@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-# Exact rational arithmetic, our own brute force bit for bit, an analytic value, Embree robust, a documented policy.
-Judge = Literal["exact", "brute force", "analytic", "Embree", "policy"]
+# Exact rational arithmetic, our own brute force bit for bit, a closed form, Embree robust, a documented rule.
+Judge = Literal["exact", "brute force", "closed form", "Embree", "rule"]
 
 
 @dataclass(frozen=True)

@@ -92,7 +92,7 @@ def _edge_on(quick: bool) -> Outcome:
         octree, rays = Octree(corners, [[0, 1, 2]]), rays_beside(rng, corners, 2000)
         found = zip(*rays, octree.closest_hit(*rays).t, strict=True)
         beside += sum(judged(corners, o, d, float(t))[0] for o, d, t in found if np.isfinite(t))
-    said = f"{beside} beside, {lost} lost, {again} not met again from their t, {hit:,} of {count:,} hit"
+    said = f"{beside} beside, {lost} lost, {again} not hit again from their t, {hit:,} of {count:,} hit"
     # Half of the rays pass beside their faces, or in their planes.
     return Outcome(said, not (beside or lost or again) and hit > count // 3)
 

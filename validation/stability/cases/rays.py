@@ -199,11 +199,11 @@ def _on_surface(quick: bool) -> Outcome:
 
 CASES: tuple[ExtremeCase, ...] = (
     ExtremeCase(
-        1, "icosphere 5 from inside, rays at edges", "0 leaks", ("analytic",), "none: a closed mesh has no holes",
+        1, "icosphere 5 from inside, rays at edges", "0 leaks", ("closed form",), "none: a closed mesh has no holes",
         _leaks(0),
     ),
     ExtremeCase(
-        2, "icosphere 5 from inside, rays at vertices", "0 leaks", ("analytic",), "none: a closed mesh has no holes",
+        2, "icosphere 5 from inside, rays at vertices", "0 leaks", ("closed form",), "none: a closed mesh has no holes",
         _leaks(1),
     ),
     ExtremeCase(
@@ -212,17 +212,17 @@ CASES: tuple[ExtremeCase, ...] = (
     ),
     ExtremeCase(
         4, "integer box [0,8]^3 of unit quads, d = target - o, also shifted by 2^20", "t == 1",
-        ("analytic", "exact"),
+        ("closed form", "exact"),
         "none where |d|'s largest component is a power of two; else dx/dz rounds: the derived bound, some 10 u",
         _integer_box,
     ),
     ExtremeCase(
-        5, "33 x 33 grid, vertical rays from z = 5 at all vertices", "1,089 hits, t == 5", ("analytic",), "none",
+        5, "33 x 33 grid, vertical rays from z = 5 at all vertices", "1,089 hits, t == 5", ("closed form",), "none",
         _grid_vertices,
     ),
-    ExtremeCase(6, "box [0,1]^3, o = (1,.5,-1), d = (-0,0,1)", "hit", ("analytic",), "none: t == 1", _box_edge),
+    ExtremeCase(6, "box [0,1]^3, o = (1,.5,-1), d = (-0,0,1)", "hit", ("closed form",), "none: t == 1", _box_edge),
     ExtremeCase(
-        7, "the same box, o = (1.0000001,.5,-1), d = +z", "miss", ("analytic",), "none; also one float64 ulp beside",
+        7, "the same box, o = (1.0000001,.5,-1), d = +z", "miss", ("closed form",), "none; also one float64 ulp beside",
         _beside_box,
     ),
     ExtremeCase(
@@ -230,15 +230,15 @@ CASES: tuple[ExtremeCase, ...] = (
         "bit for bit: the tilt moves nothing by an ulp", _denormal_direction,
     ),
     ExtremeCase(
-        9, "rays in a triangle's plane", "miss, no NaN", ("policy", "Embree"),
+        9, "rays in a triangle's plane", "miss, no NaN", ("rule", "Embree"),
         "none where nothing rounds; elsewhere float64 cannot tell: a hit must be one that rounding permits",
         _in_plane,
     ),
     ExtremeCase(
-        10, "NaN, infinite or zero direction or origin", "ValueError that names the row", ("policy",), "none", _bad_rays
+        10, "NaN, infinite or zero direction or origin", "ValueError that names the row", ("rule",), "none", _bad_rays
     ),
     ExtremeCase(
-        11, "origin on the surface", "t = 0: the interval is closed", ("policy",), "none: all numbers are exact",
+        11, "origin on the surface", "t = 0: the interval is closed", ("rule",), "none: all numbers are exact",
         _on_surface,
     ),
 )  # fmt: skip

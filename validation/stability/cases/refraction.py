@@ -224,7 +224,7 @@ def _nested(quick: bool) -> Outcome:
 
 
 CASES: tuple[ExtremeCase, ...] = (
-    ExtremeCase(35, "n1 = n2, any angle", "picture = no object", ("analytic",), STORED, _index_one),
+    ExtremeCase(35, "n1 = n2, any angle", "picture = no object", ("closed form",), STORED, _index_one),
     ExtremeCase(
         36,
         "glass, and indices 10 and 1e3, to air at the critical angle (1 +- 1e-7 to 1e-15)",
@@ -237,7 +237,7 @@ CASES: tuple[ExtremeCase, ...] = (
         37,
         "eta = 1e-3, 1e3",
         "Snell's residual <= 4 u max(n1, n2)",
-        ("analytic",),
+        ("closed form",),
         "4 u: the roundings of d . n, of q and of the product with eta; judged in fifty digits",
         _steep_indices,
     ),
@@ -245,7 +245,7 @@ CASES: tuple[ExtremeCase, ...] = (
         38,
         "plate of thickness 1, n = 1.5, 60 degrees",
         "parallel exit, shift .51247",
-        ("analytic",),
+        ("closed form",),
         "1e-12: a hit on faces 20 long errs by up to 264 u 20 = 6e-13, and the interval is halved to 1e-13",
         _plate_shift,
     ),
@@ -253,7 +253,7 @@ CASES: tuple[ExtremeCase, ...] = (
         39,
         "camera at (.8, 0, 0) in a unit glass sphere",
         "total internal reflection at the first hit for sqrt(11) / 6 = 55.277 % of directions",
-        ("analytic",),
+        ("closed form",),
         "1e-3: the rim crosses some 800 of 55,296 pixels, 3 sqrt(800) / 2 / 55,296 = 8e-4; facets of edge h = .04 lie "
         "h^2 / 8 = 2e-4 inside",
         _inside_ball,
@@ -262,7 +262,7 @@ CASES: tuple[ExtremeCase, ...] = (
         40,
         "n = 1.5 sphere inside an n = 1.5 sphere; air, water and denser glass in glass",
         "inner one invisible; Fresnel's shares of each boundary at normal incidence",
-        ("analytic",),
+        ("closed form",),
         STORED,
         _nested,
     ),

@@ -1,6 +1,6 @@
 """Small scenes of known radiance, for the extreme cases of shading."""
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ MIRROR = Mirror(type="mirror")
 
 def scene_of(camera: Camera, *parts: tuple[Mesh, Material], smooth: bool = False, **more: Any) -> Scene:
     """A scene of meshes with their materials; ambient light is 1 unless given."""
-    normals = "smooth" if smooth else "flat"
+    normals: Literal["flat", "smooth"] = "smooth" if smooth else "flat"
     return Scene(
         camera=camera,
         materials={f"m{i}": material for i, (_, material) in enumerate(parts)} | more.pop("materials", {}),

@@ -64,7 +64,7 @@ def _thin(quick: bool) -> Outcome:
 CASES: tuple[ExtremeCase, ...] = (
     ExtremeCase(
         49, "a closed mesh with a face of no area, or hardly any, at a split side, or a needle; rays from within",
-        "every ray hits, at t = 1; as brute force", ("analytic", "brute force"),
+        "every ray hits, at t = 1; as brute force", ("closed form", "brute force"),
         "t within 1e-8, ten times as much as the widest of these faces moves it", _thin,
     ),
 )  # fmt: skip

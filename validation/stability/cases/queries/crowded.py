@@ -92,7 +92,7 @@ def _crowded(quick: bool) -> Outcome:
 CASES: tuple[ExtremeCase, ...] = (
     ExtremeCase(
         54, "inside and all hits at a corner of 100,000 faces, 1e9 away, beside faces that are lines, of triple faces",
-        "inside, contacts and hits as in real arithmetic; NaN refused by its row", ("exact", "analytic"),
+        "inside, contacts and hits as in real arithmetic; NaN refused by its row", ("exact", "closed form"),
         f"none but that of winding numbers, {_TOLERANCE}, as asked", _crowded,
     ),
 )  # fmt: skip

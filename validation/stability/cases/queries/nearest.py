@@ -78,7 +78,7 @@ def _nearest(quick: bool) -> Outcome:
 CASES: tuple[ExtremeCase, ...] = (
     ExtremeCase(
         53, "nearest points of faces that are lines, points or twice there, slivers, a fan; far; all sizes at once",
-        "the exact distance, rounded, and of equal ones the lowest face; NaN refused by its row", ("exact", "analytic"),
+        "the exact distance, rounded, and the lowest of equal faces; NaN refused by its row", ("exact", "closed form"),
         "half an ulp, as the answer is rounded once", _nearest,
     ),
 )  # fmt: skip

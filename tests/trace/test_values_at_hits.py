@@ -1,0 +1,64 @@
+"""Values of vertices and faces at hits."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from cases import cases
+
+from renderer import BruteForce, Mesh, Octree
+from renderer.mesh.shapes import icosphere
+
+pytestmark = pytest.mark.judges("Hits.interpolate", "AllHits.interpolate", "ClosestPoints.interpolate")
+
+BALL = icosphere(2)
+RNG = np.random.default_rng(9)
+ORIGINS, DIRECTIONS = 3 * RNG.normal(size=(60, 3)), RNG.normal(size=(60, 3))
+
+
+@cases("accelerator", [Octree, BruteForce])
+def test_positions_as_values_are_the_points(accelerator: Any) -> None:
+    """A linear function of the place is the same by its values at the vertices."""
+    queries = accelerator(BALL)
+    ways = 2.0 * DIRECTIONS - ORIGINS
+    hits, everything = queries.closest_hit(ORIGINS, ways), queries.all_hits(ORIGINS, ways)
+    near = queries.closest_point(ORIGINS, max_distance=2.0)
+    for found, there in ((hits, hits.hit), (everything, slice(None)), (near, near.found)):
+        np.testing.assert_allclose(found.interpolate(BALL.vertices), found.points, atol=1e-15)
+        heights = found.interpolate(BALL.vertices[:, 2].tolist())
+        assert heights.dtype == np.float64 and heights.shape == found.face.shape
+        np.testing.assert_allclose(heights, found.points[:, 2], atol=1e-15)
+        labels = RNG.integers(0, 9, (len(BALL.faces), 2))
+        np.testing.assert_array_equal(found.interpolate(labels)[there], labels[found.face[there]])
+    assert np.isnan(hits.interpolate(BALL.vertices)[~hits.hit]).all() and (~hits.hit).any()
+    assert np.isnan(near.interpolate(range(len(BALL.faces)))[~near.found]).all() and (~near.found).any()
+
+
+def test_values_keep_the_shape_of_the_rays() -> None:
+    hits = Octree(BALL).closest_hit(ORIGINS.reshape(3, 20, 3), -ORIGINS.reshape(3, 20, 3))
+    assert hits.interpolate(np.zeros((len(BALL.vertices), 4, 2))).shape == (3, 20, 4, 2)
+    assert Octree(BALL).closest_hit([0, 0, 3], [0, 0, -1]).interpolate(BALL.vertices[:, 2]).shape == ()
+
+
+def test_what_values_belong_to_is_told_where_numbers_do_not_tell() -> None:
+    tetrahedron = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    hits = Octree(tetrahedron).closest_hit([0.25, 0.25, -1], [0, 0, 1])
+    values = [1.0, 2.0, 4.0, 8.0]
+    assert hits.interpolate(values, on="faces") == 1.0 and hits.interpolate(values, on="vertices") == 2.0
+    with pytest.raises(ValueError, match=r"^values: expected on='vertices' or on='faces', as the mesh has 4 of both"):
+        hits.interpolate(values)
+
+
+@cases(
+    ("given", "says"),
+    [
+        ({"values": [1.0, 2.0]}, r"^values: expected 162 rows, one a vertex, or 320, one a face, got shape \(2,\)$"),
+        ({"values": 1.0}, r"^values: expected 162 rows, .* got shape \(\)$"),
+        ({"values": np.zeros(162), "on": "faces"}, r"^values: expected 320 rows for on='faces', got shape \(162,\)$"),
+        ({"values": np.zeros(162), "on": "edges"}, "^on: expected 'vertices', 'faces' or None, got 'edges'$"),
+        ({"values": ["a"] * 162}, "^values: expected real numbers"),
+    ],
+)
+def test_other_values_are_errors(given: Any, says: str) -> None:
+    with pytest.raises(ValueError, match=says):
+        Octree(BALL).closest_hit(ORIGINS, DIRECTIONS).interpolate(**given)
