@@ -20,7 +20,7 @@ help:
 	@echo "make validate   prove hits and pictures against the references; writes reports/index.html"
 	@echo "                QUICK=1 for the short run, ARGS='--only hits' for a part"
 	@echo "make test       run the tests that a change needs; ARGS=tests/trace for some"
-	@echo "make test-slow  run the others: documents, packages, and the viewer's page in a browser"
+	@echo "make test-slow  run the others: cache, cluster, documents, packages, and the viewer's page in a browser"
 	@echo "make machines   run the tests on a busy, a small, a large and a foreign machine, half an hour"
 	@echo "make lint       check style, types, import order and the absence of other languages"
 	@echo "make bench      measure speed beside other systems; writes reports/benchmark.html"
@@ -34,7 +34,7 @@ validate: $(STAMP)
 
 PYTEST := $(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal
 # Rooms of tests that take as long as all the others, and that few changes touch.
-SLOW   := tests/documents tests/packaging tests/page
+SLOW   := tests/cache tests/cluster tests/documents tests/packaging tests/page
 
 test: $(STAMP)
 	$(PYTEST) $(SLOW:%=--ignore=%) $(ARGS)
