@@ -504,7 +504,8 @@ def load_scene(path: str | os.PathLike[str], *, up: Literal["x", "y", "z"] | Non
         try:
             mesh = load_mesh(path)
         except MeshError as error:
-            raise SceneError(str(error)) from None
+            kind = NoSuchSceneError if isinstance(error, FileNotFoundError) else SceneError
+            raise kind(str(error)) from None
         table = tomllib.loads(showcase_text(mesh, "model", _up_of_mesh(up)))
         table["objects"][0]["mesh"] = mesh
         return _checked(table, path)

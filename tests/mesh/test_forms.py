@@ -78,9 +78,9 @@ def test_what_is_no_mesh_is_said(accelerator: Any, given: Any, says: str) -> Non
 
 @pytest.mark.judges("load_mesh", "Octree.load", "load_scene")
 def test_a_missing_file_is_what_python_calls_it_and_what_this_package_does(tmp_path: Path) -> None:
-    missing = tmp_path / "missing.ply"
-    for call, own in ((load_mesh, MeshError), (Octree, MeshError), (Octree.load, ValueError), (load_scene, SceneError)):
-        path = missing.with_suffix(".toml") if call is load_scene else missing
+    mesh, scene = tmp_path / "missing.ply", tmp_path / "missing.toml"
+    calls = [(load_mesh, mesh, MeshError), (Octree, mesh, MeshError), (Octree.load, mesh, ValueError)]
+    for call, path, own in [*calls, (load_scene, scene, SceneError), (load_scene, mesh, SceneError)]:
         with pytest.raises(FileNotFoundError) as caught:
             call(path)
         assert isinstance(caught.value, own)
