@@ -12,7 +12,9 @@ import subprocess
 import sys
 import textwrap
 import tomllib
+from dataclasses import fields
 from functools import cache
+from glob import glob
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -21,7 +23,7 @@ import pytest
 import yaml
 from cases import cases
 
-from renderer import Octree, load_scene
+from renderer import Hits, Octree, load_scene
 from renderer.cli.main import main, make_parser
 from renderer.mesh.load import save_ply
 from renderer.mesh.shapes import box
@@ -97,6 +99,7 @@ RUN_ELSEWHERE = {
     "octree-render view": "tests/viewer/test_viewer_server.py",
     "octree-render compile --level": "tests/packaging/test_compiling_ahead.py",
     "octree-render study sky city.ply -o sky.npy --cluster tcp://": "tests/cluster/test_commands.py",
+    "octree-validate --compare": "tests/validation/recorded/test_recorded.py",
     "python -m validation.benchmark.measures.versions": "tests/validation/benchmark/test_versions.py",
 }
 # Commands that nothing runs, by how they begin, and why. Their options are checked as those of all others are, and what
@@ -233,6 +236,9 @@ def checkout(tmp_path, monkeypatch):
     """A folder with what the pages' commands name: parts of a checkout, and a user's own files."""
     for name in ("scenes", "renderer", "validation", "tests"):
         (tmp_path / name).symlink_to(ROOT / name)
+    (tmp_path / "houses").mkdir()
+    for name in ("houses/1.obj", "houses/tree_1.obj", "terrain.obj"):
+        (tmp_path / name).write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     for name in ("city.ply", "scan.ply"):
         save_ply(box((0.0, 0.0, 0.0), (4.0, 3.0, 2.0)), tmp_path / name)
     (tmp_path / "suns.txt").write_text("1 0 1\n-1 0 1\n")
@@ -248,7 +254,7 @@ def checkout(tmp_path, monkeypatch):
 @pytest.mark.parametrize(("page", "line"), runnable(), ids=shown)
 def test_a_command_of_a_page_runs(page, line, checkout):
     before = set(checkout.iterdir())
-    program, *arguments = in_short(line)
+    program, *arguments = [path for word in in_short(line) for path in sorted(glob(word)) or [word]]
     if program == "octree-render":
         assert make_parser().prog == program and main(arguments) == 0
     else:
@@ -485,15 +491,8 @@ def test_what_a_page_names_is_there(page):
 def test_extreme_cases_and_gates_that_a_page_names_are_there(page):
     numbers = {case.number for case in CASES}
     assert {int(number) for number in re.findall(r"\b[Cc]ase (\d+)\b", page.read_text(encoding="utf-8"))} <= numbers
-    gates = set(re.findall(r"`hits\.(\w+)`", page.read_text(encoding="utf-8"))) - {
-        "t",
-        "face",
-        "u",
-        "v",
-        "points",
-        "normals",
-        "hit",
-    }
+    attributes = {*dir(Hits), *(field.name for field in fields(Hits))}
+    gates = set(re.findall(r"`hits\.(\w+)`", page.read_text(encoding="utf-8"))) - attributes
     assert gates <= set(HitLimits.model_fields)
 
 

@@ -46,7 +46,7 @@ reveal_type(depths("model.ply"))
 """
 # Patterns: mypy names a type of NumPy now by itself, now by its bits.
 REVEALED = [
-    r"-> renderer\.octree\.Octree$",
+    r"-> renderer\.octree\.Octree\)?$",
     "float64|_64Bit",
     "float64|_64Bit",
     "float32|_32Bit",
