@@ -289,7 +289,6 @@ def _plane_near(p0, p1, p2, o):
 def _moved(o, plane, away):
     """The point o near a face, moved along the normal until it is certainly off; away = -1 is the other side."""
     out = scale(plane.normal, away)
-    # rule: move-off-face
     step = scale(out, plane.needed - away * plane.height)
     return (_away(o[0], step[0], out[0]), _away(o[1], step[1], out[1]), _away(o[2], step[2], out[2]))
 

@@ -127,7 +127,6 @@ _CHANGES: dict[str, Change] = {
     "a fin stops rays that start beside it": Rule("bounds-one-side", without("and", 3)),
     "a start on an edge is beside the next face": Rule("start-on-edge", value("False")),
     "which side a ray leads to is told by a rounded normal": Function("slope_of", _ROUNDED_SLOPE),
-    "rays leave a face by a thousandth of the bound": Rule("move-off-face", operand("-", 0, "1e-3 * _")),
     "starts beside an edge are moved as if inside": Rule("start-inside-face", value("True")),
 }
 HITS = tuple(Defect("hits", name, change) for name, change in _CHANGES.items())
