@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from validation.defects.changes import Change, Constant, Function, Rule, Wrapped, after
-from validation.defects.edits import argument, call, choice, compare, drop, element, operand, value, without
+from validation.defects.edits import argument, call, choice, compare, drop, element, value, without
 from validation.defects.seeded.defect import Defect
 
 
