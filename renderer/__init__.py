@@ -21,6 +21,7 @@ The public names::
         PerspectiveCamera, OrthographicCamera
         Phong, Mirror, Dielectric
         DirectionalLight, PointLight
+        Sky                  a gradient around the scene, which shines
         SceneObject, Floor   a mesh placed in a scene, and a rectangle of the ground
         RenderSettings       resolution, samples and bounces
         render               a picture of a scene

@@ -32,5 +32,6 @@ from .scene.scene import RenderSettings as RenderSettings
 from .scene.scene import Scene as Scene
 from .scene.scene import SceneObject as SceneObject
 from .scene.scene import load_scene as load_scene
+from .scene.sky import Sky as Sky
 from .version import __version__ as __version__
 from .viewer.view import view as view

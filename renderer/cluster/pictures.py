@@ -190,7 +190,7 @@ class _Sender:
 
 
 def _same_but_for_camera(scene: Scene, other: Scene) -> bool:
-    shown = ("materials", "lights", "ambient", "background")
+    shown = ("materials", "lights", "ambient", "background", "sky")
     return scene.instances is other.instances and all(getattr(scene, n) == getattr(other, n) for n in shown)
 
 

@@ -17,7 +17,7 @@ from renderer.shade.crossing import SPARE, Change, Together, change_of, place_at
 from renderer.shade.lights import aim_from
 from renderer.shade.records import AMBIENT, KIND, LAMBERT, MATERIAL_COLUMNS, PHONG
 from renderer.shade.shading import reflect
-from renderer.shade.surface import SceneArrays, Surface, phong_of, surface_of
+from renderer.shade.surface import SceneArrays, Surface, missed_of, phong_of, surface_of
 from renderer.shade.whitted import passes_light_of, refract_from
 from renderer.trace.batch import check_rays, make_starts
 from renderer.trace.closest import closest_hits
@@ -119,7 +119,7 @@ class Steps:
 
     def background(self, ray: Ray) -> Vector:
         """The contribution to the pixel of a ray that misses."""
-        return times(ray.weight, color_at(self.arrays.colors[1], 0))
+        return times(ray.weight, missed_of(self.arrays, ray.direction))
 
     def ambient(self, ray: Ray, met: SurfaceHit) -> Vector:
         """The contribution to the pixel of the ambient light on a surface."""

@@ -14,6 +14,7 @@ from renderer.arguments.arrays import plain_array, real_array
 from renderer.arguments.types import ArrayLike
 from renderer.errors import MeshError
 from renderer.lazy import lazy
+from renderer.mesh.crease import Split
 from renderer.mesh.edges import open_edges
 from renderer.mesh.foreign import TriangleMesh, attributes_of, has_own_normals, has_triangles
 from renderer.mesh.parts import Part, parts_of
@@ -405,6 +406,50 @@ class Mesh:
         >>> box((-1, -1, -1), (1, 1, 1)).vertex_normals()[7].round(3)
         array([0.577, 0.577, 0.577])
         """
+        return self._mean_normals(self.faces.ravel(), len(self.vertices))
+
+    def creased(self, angle: float = 30.0) -> Mesh:
+        """Return the mesh with normals that are smooth but for sharp edges.
+
+        Vertices are split at edges where the normals of the faces differ by more than the angle. Edges are told apart
+        by the positions of their ends, so faces that share no vertex, as in an STL file, are smooth too. Faces keep
+        their order and corners.
+
+        Parameters
+        ----------
+        angle : float, default 30
+            From 0 to 180 degrees.
+
+        Returns
+        -------
+        Mesh
+            Its `normals` are means of the normals of faces, weighted by the face's angle at the vertex.
+
+        Raises
+        ------
+        ValueError
+            For another angle.
+
+        Examples
+        --------
+        >>> from renderer.mesh.shapes import box, icosphere
+        >>> box().creased().normals[0].tolist(), len(box().vertices), len(box().creased().vertices)
+        ([0.0, 0.0, -1.0], 8, 24)
+        >>> len(icosphere(3).vertices) == len(icosphere(3).creased().vertices)
+        True
+        """
+        split = Split(self, angle)
+        means = self._mean_normals(split.group, int(split.group.max(initial=-1)) + 1)
+        kept = {
+            name: None if (values := getattr(self, name)) is None else values[split.vertices]
+            for name in ("colors", "texcoords")
+        }
+        normals = means[split.group_of_vertex]
+        made = Mesh(self.vertices[split.vertices], split.faces, normals, name=self.name, **kept)
+        return give_parts(made, self._parts)
+
+    def _mean_normals(self, group: NDArray[np.integer[Any]], count: int) -> Float64Array:
+        """The unit normals, (count, 3), of groups of corners; ``group`` has the number of each corner's, (3 F,)."""
         x, y, z = (np.ascontiguousarray(self.vertices[:, axis])[self.faces.T] for axis in range(3))
         corners = [(x[k], y[k], z[k]) for k in range(3)]
         normals = _unit(_cross(*_scaled(_minus(corners[1], corners[0]), _minus(corners[2], corners[0]))))
@@ -416,8 +461,7 @@ class Mesh:
             for axis in range(3):
                 # rule: weight-by-angle
                 weighted[axis, :, corner] = normals[axis] * angle
-        flat, count = self.faces.ravel(), len(self.vertices)
-        sums = [np.bincount(flat, along.ravel(), minlength=count).astype(np.float64) for along in weighted]
+        sums = [np.bincount(group, along.ravel(), minlength=count).astype(np.float64) for along in weighted]
         return np.stack(_unit((sums[0], sums[1], sums[2])), axis=1)
 
     def is_closed(self) -> bool:

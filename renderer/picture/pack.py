@@ -40,6 +40,7 @@ def pack(scene: Scene, needs: Features | None = None) -> tuple[Mesh, SceneArrays
         materials=_materials(scene, needs),
         lights=light_rows(scene, needs),
         colors=np.array([scene.ambient, scene.background]),
+        sky=np.zeros((0, 3)) if scene.sky is None else scene.sky.rows(scene.up),
         media=media_around(scene, scene.camera) if needs.refraction else np.zeros(0, np.int64),
         touching=np.zeros(0, np.uint8),
     )
@@ -69,7 +70,7 @@ def light_rows(scene: Scene, needs: Features) -> NDArray[np.float64]:
     """The rows of the lights that shine, and of as many others as ``needs`` asks for, in the scene's order."""
     if not needs.shadows:
         return np.zeros((0, LIGHT_COLUMNS))
-    rows = np.array([light_row(light) for light in scene.lights]).reshape(-1, LIGHT_COLUMNS)
+    rows = np.array([light_row(light) for light in scene.all_lights]).reshape(-1, LIGHT_COLUMNS)
     dark = ~rows[:, 4:].any(axis=1)
     extra = np.cumsum(dark) <= needs.lights - np.count_nonzero(~dark)
     return rows[~dark | (dark & extra)]

@@ -90,7 +90,7 @@ def examine(scene: Scene, max_depth: int | None = None) -> tuple[Finding, ...]:
     used = {i.material: scene.materials[i.material] for i in present}
     phong = {name: m for name, m in used.items() if isinstance(m, Phong)}
     # rule: shining-lights
-    shining = sum(any(light_row(light)[4:]) for light in scene.lights)
+    shining = sum(any(light_row(light)[4:]) for light in scene.all_lights)
     faces = sum(len(i.mesh.faces) for i in present)
     receiving = _lit("shadows", "receives direct light", shining, (n for n, m in phong.items() if m.receives_light))
     return (
@@ -99,7 +99,7 @@ def examine(scene: Scene, max_depth: int | None = None) -> tuple[Finding, ...]:
         receiving,
         _lit("specular", "has highlights", shining, (n for n, m in phong.items() if any(m.specular))),
         _smooth(present),
-        _lights(receiving, shining, len(scene.lights)),
+        _lights(receiving, shining, len(scene.all_lights)),
         _precision(present),
         Finding("octree", faces > FEW_FACES, f"{faces} faces, and a tree pays above {FEW_FACES}"),
     )
@@ -150,7 +150,7 @@ def checked_needs(needs: Features | None, scene: Scene, max_depth: int) -> Featu
     expect(isinstance(needs, Features), "needs", "a Needs or None", type(needs).__name__)
     for finding, (name, given) in zip(findings, asdict(needs).items(), strict=True):
         if name == "lights":
-            count_argument("needs.lights", given, int(finding.value), len(scene.lights))
+            count_argument("needs.lights", given, int(finding.value), len(scene.all_lights))
         else:
             expect(isinstance(given, bool), f"needs.{name}", "True or False", repr(given))
             expect(given or not finding.value, f"needs.{name}", f"True ({finding.reason})", "False")
@@ -159,7 +159,7 @@ def checked_needs(needs: Features | None, scene: Scene, max_depth: int) -> Featu
 
 def lit_materials(scene: Scene) -> list[Phong]:
     """The Phong materials of faces, none where no light shines."""
-    if not any(any(light_row(light)[4:]) for light in scene.lights):
+    if not any(any(light_row(light)[4:]) for light in scene.all_lights):
         return []
     used = (scene.materials[i.material] for i in _present(scene))
     return [material for material in used if isinstance(material, Phong)]

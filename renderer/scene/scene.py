@@ -29,6 +29,7 @@ from renderer.scene.fields import Color, Fields, FiniteVector, Keys, SceneWarnin
 from renderer.scene.light import DirectionalLight, Light, PointLight
 from renderer.scene.material import Material
 from renderer.scene.showcase import showcase_text
+from renderer.scene.sky import Sky
 from renderer.system.files import as_path, read_whole, write_atomically
 
 
@@ -165,6 +166,8 @@ class SceneObject(Fields):
         The name of one of the scene's materials.
     normals : {"flat", "smooth"}, default "flat"
         Whether shading interpolates the normals of vertices: those of the file, or else means of the faces around.
+    crease : float, default 180
+        Where the file has no normals: the angle in degrees above which an edge stays sharp. 180 smooths all edges.
     scale : float or array_like, shape (3,), default 1
         The factor of all axes, or of each.
     rotate : array_like, shape (3,), default (0, 0, 0)
@@ -194,6 +197,7 @@ class SceneObject(Fields):
     mesh: Annotated[Path | Mesh, BeforeValidator(_path_or_mesh)]
     material: str
     normals: Literal["flat", "smooth"] = "flat"
+    crease: Annotated[float, Field(ge=0.0, le=180.0, strict=True)] = 180.0
     scale: Annotated[FiniteVector, BeforeValidator(thrice)] = (1.0, 1.0, 1.0)
     rotate: FiniteVector = (0.0, 0.0, 0.0)
     translate: FiniteVector = (0.0, 0.0, 0.0)
@@ -205,6 +209,7 @@ class SceneObject(Fields):
         mesh: Mesh | str | os.PathLike[str],
         material: str,
         normals: Literal["flat", "smooth"] = "flat",
+        crease: float = 180.0,
         scale: ArrayLike = 1.0,
         rotate: ArrayLike = (0.0, 0.0, 0.0),
         translate: ArrayLike = (0.0, 0.0, 0.0),
@@ -304,6 +309,7 @@ class SceneChanges(TypedDict, total=False):
     lights: Sequence[Light | Mapping[str, Any]]
     ambient: ArrayLike
     background: ArrayLike
+    sky: Sky | Mapping[str, Any] | None
     render: RenderSettings | Mapping[str, Any]
 
 
@@ -326,6 +332,8 @@ class Scene(Fields):
         Light from everywhere, for the ``ambient`` of ``Phong``.
     background : float or array_like, shape (3,), default 0
         The radiance where a ray hits nothing.
+    sky : Sky, optional
+        A sky in place of the background. Its lights shine beside ``lights``.
     up : {"x", "y", "z"}, default "y"
         The axis that points up: that of the floor, and of a camera that has no ``up`` of its own.
     render : RenderSettings, optional
@@ -357,6 +365,7 @@ class Scene(Fields):
     floor: Floor | None = None
     ambient: Color = (0.0, 0.0, 0.0)
     background: Color = (0.0, 0.0, 0.0)
+    sky: Sky | None = None
     up: Literal["x", "y", "z"] = "y"
     render: RenderSettings = _USUAL
 
@@ -371,6 +380,7 @@ class Scene(Fields):
         floor: Floor | Mapping[str, Any] | None = None,
         ambient: ArrayLike = 0.0,
         background: ArrayLike = 0.0,
+        sky: Sky | Mapping[str, Any] | None = None,
         up: Literal["x", "y", "z"] = "y",
         render: RenderSettings | Mapping[str, Any] = _USUAL,
     ) -> None: ...
@@ -393,6 +403,12 @@ class Scene(Fields):
         if isinstance(camera, PerspectiveCamera | OrthographicCamera) and "up" not in camera.model_fields_set:
             camera = type(camera).model_validate({**camera.model_dump(), "up": up})
         return {**values, "camera": {"up": up, **camera} if isinstance(camera, dict) else camera}
+
+    @model_validator(mode="after")
+    def _one_background(self) -> Scene:
+        if self.sky is not None and any(self.background):
+            raise ValueError(f"background: expected none beside a sky, got {self.background}")
+        return self
 
     @model_validator(mode="after")
     def _materials_exist(self) -> Scene:
@@ -420,12 +436,23 @@ class Scene(Fields):
         >>> [(part.material, part.smooth, part.mesh.name) for part in scene.instances]
         [('grey', True, 'icosphere')]
         """
-        placed = [
-            Instance(_place(_loaded(o.mesh), o.matrix()), o.material, o.normals == "smooth") for o in self.objects
-        ]
+        placed = [Instance(_placed(o), o.material, o.normals == "smooth") for o in self.objects]
         if self.floor is not None:
             placed += [Instance(m, name, False) for m, name in _floor_meshes(self.floor, UP_AXES[self.up])]
         return tuple(placed)
+
+    @lazy
+    def all_lights(self) -> tuple[Light, ...]:
+        """The lights, then those of the sky.
+
+        Examples
+        --------
+        >>> from renderer import PerspectiveCamera, Scene, Sky
+        >>> scene = Scene(camera=PerspectiveCamera(eye=(0, 0, 1), target=(0, 0, 0)), materials={}, sky=Sky(lights=8))
+        >>> len(scene.all_lights)
+        8
+        """
+        return self.lights if self.sky is None else (*self.lights, *self.sky.directional(self.up))
 
     def altered(self, **changes: Unpack[SceneChanges]) -> Scene:
         """A copy with other values of some fields. It shares the meshes: none is loaded or placed again.
@@ -433,7 +460,7 @@ class Scene(Fields):
         Parameters
         ----------
         **changes
-            New values of ``camera``, ``materials``, ``lights``, ``ambient``, ``background`` or ``render``.
+            New values of ``camera``, ``materials``, ``lights``, ``ambient``, ``background``, ``sky`` or ``render``.
 
         Returns
         -------
@@ -599,6 +626,13 @@ def warn_of_slips(camera: Camera | None, materials: Mapping[str, Material], wher
 
 def _loaded(mesh: Path | Mesh) -> Mesh:
     return mesh if isinstance(mesh, Mesh) else load_mesh(mesh)
+
+
+def _placed(object_: SceneObject) -> Mesh:
+    """The mesh of an object in the world, with split vertices where smooth shading stops at sharp edges."""
+    mesh = _place(_loaded(object_.mesh), object_.matrix())
+    creased = object_.normals == "smooth" and object_.crease < 180.0 and mesh.normals is None
+    return mesh.creased(object_.crease) if creased else mesh
 
 
 def _place(mesh: Mesh, matrix: NDArray[np.float64]) -> Mesh:

@@ -28,6 +28,7 @@ class SceneArrays(NamedTuple):
     materials  (M, MATERIAL_COLUMNS)
     lights     (L, LIGHT_COLUMNS)
     colors     (2, 3), ambient and background
+    sky        (4, 3), the unit vector up, and the radiance of zenith, horizon and ground; no rows without a sky
     media      (m,) int64, m <= MAX_MEDIA, the same place for each medium that the eye is in, outermost first
     touching   (F,) uint8, not 0 for faces that may coincide with one that transmits light; no rows if none does
     """
@@ -40,13 +41,14 @@ class SceneArrays(NamedTuple):
     materials: NDArray[np.float64]
     lights: NDArray[np.float64]
     colors: NDArray[np.float64]
+    sky: NDArray[np.float64]
     media: NDArray[np.int64]
     touching: NDArray[np.uint8]
 
 
 class ScenePointers(NamedTuple):
     """A ``SceneArrays`` as pointers, with the numbers of lights and of media around the eye, and whether any face is
-    smooth and any touches another.
+    smooth, any touches another and there is a sky.
     """
 
     vertices: Any
@@ -57,12 +59,14 @@ class ScenePointers(NamedTuple):
     materials: Any
     lights: Any
     colors: Any
+    sky: Any
     media: Any
     touching: Any
     light_count: int
     media_count: int
     has_smooth: bool
     has_touching: bool
+    has_sky: bool
 
 
 @inlined
@@ -77,12 +81,14 @@ def scene_pointers(scene):
         pointer(scene.materials),
         pointer(scene.lights),
         pointer(scene.colors),
+        pointer(scene.sky),
         pointer(scene.media),
         pointer(scene.touching),
         len(scene.lights),
         len(scene.media),
         len(scene.smooth) > 0,
         len(scene.touching) > 0,
+        len(scene.sky) > 0,
     )
 
 
@@ -156,6 +162,18 @@ def phong(scene, m, n, d, towards):
 
 
 @inlined
+def missed(scene, d):
+    """The radiance of a ray of unit direction d that hits nothing."""
+    if not scene.has_sky:
+        return row3(scene.colors, 1)
+    # rule: sky-gradient
+    sine = dot(row3(scene.sky, 0), d)
+    if sine <= 0.0:
+        return row3(scene.sky, 3)
+    return add(scale(row3(scene.sky, 1), sine), scale(row3(scene.sky, 2), 1.0 - sine))
+
+
+@inlined
 def lets_through(materials, m):
     """Whether the material in row ``m`` transmits light."""
     return largest_component(three(materials, m + TRANSMITTANCE)) > 0.0
@@ -165,6 +183,12 @@ def lets_through(materials, m):
 def surface_of(arrays, face, u, v, d):
     """``surface_at``, for Python."""
     return surface_at(scene_pointers(arrays), face, u, v, d)
+
+
+@kernel
+def missed_of(arrays, d):
+    """``missed``, for Python."""
+    return missed(scene_pointers(arrays), d)
 
 
 @kernel

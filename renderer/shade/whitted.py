@@ -56,7 +56,7 @@ from renderer.shade.direct import (
 )
 from renderer.shade.records import AMBIENT, DIELECTRIC, KIND, MIRROR, REFLECTANCE, TRANSMITTANCE
 from renderer.shade.shading import fresnel, reflect, refract
-from renderer.shade.surface import lets_through, look_at, scene_pointers, surface_at
+from renderer.shade.surface import lets_through, look_at, missed, scene_pointers, surface_at
 from renderer.trace.rays import HitPointers, RayPointers
 from renderer.trace.spawn import OffsetRule, Place, put_start, spawn_origin
 from renderer.trace.starts.level import Spot
@@ -228,7 +228,7 @@ def _meet_surfaces(tree, scene, bundle, scratch):
         pixel = load(bundle.pixels, i)
         store(scratch.traced, pixel, load(scratch.traced, pixel) + 1)
         if load(scratch.found.face, i) < 0:
-            seen = times(row3(bundle.weights, i), row3(scene.colors, 1))
+            seen = times(row3(bundle.weights, i), missed(scene, row3(bundle.directions, i)))
             put3(scratch.color, 3 * pixel, add(row3(scratch.color, pixel), seen))
         elif is_lit(scene.materials, _meet_surface(tree, scene, bundle, scratch, i)):
             lit += 1

@@ -22,6 +22,7 @@ from renderer.scene.camera import OrthographicCamera
 from renderer.scene.light import DirectionalLight, Light, PointLight
 from renderer.scene.material import Dielectric, Material, Mirror, Phong
 from renderer.scene.scene import Scene
+from renderer.scene.sky import Sky
 
 _ADDS = {
     "diffuse": "direct diffuse light, of a lamp at the eye",
@@ -74,7 +75,7 @@ def _needless(scene: Scene) -> dict[str, str]:
     materials = [scene.materials[instance.material] for instance in scene.instances]
     phong = [material for material in materials if isinstance(material, Phong)]
     needless = {}
-    if not scene.lights:
+    if not scene.all_lights:
         needless = dict.fromkeys(("diffuse", "highlights", "shadows"), "the scene has no lights")
     elif not any(any(material.specular) for material in phong):
         needless["highlights"] = "no surface of the scene has highlights"
@@ -87,9 +88,14 @@ def _needless(scene: Scene) -> dict[str, str]:
 
 def _derived(scene: Scene, level: int) -> Scene:
     """The scene of a rung below everything; meshes are not loaded again."""
-    lights = scene.lights if level >= _SHADOWS else (_lamp(scene),)
+    lights, sky = (scene.lights, scene.sky) if level >= _SHADOWS else ((_lamp(scene),), _unlit(scene.sky))
     materials = {name: _reduced(material, level) for name, material in scene.materials.items()}
-    return scene.altered(lights=lights, materials=materials, ambient=_BLACK)
+    return scene.altered(lights=lights, sky=sky, materials=materials, ambient=_BLACK)
+
+
+def _unlit(sky: Sky | None) -> Sky | None:
+    """The sky without its lights."""
+    return None if sky is None else sky.model_copy(update={"lights": 0})
 
 
 def _reduced(material: Material, level: int) -> Material:
@@ -121,4 +127,4 @@ def _same(derived: Scene, scene: Scene) -> bool:
     """Whether two scenes with the same meshes give the same picture; only Phong surfaces show ambient light."""
     used = {instance.material for instance in scene.instances}
     alike = all(derived.materials[name] == scene.materials[name] for name in used)
-    return alike and derived.lights == scene.lights and derived.ambient == scene.ambient
+    return alike and derived.all_lights == scene.all_lights and derived.ambient == scene.ambient

@@ -143,5 +143,5 @@ def _check(scene: Scene) -> None:
         for m in used
     )
     one_light = len(scene.lights) == 1 and isinstance(scene.lights[0], PointLight)
-    if not plain or not one_light or any(scene.ambient):
+    if not plain or not one_light or any(scene.ambient) or scene.sky is not None:
         raise ValueError("scene: expected diffuse, mirror and clear glass under one point light, got more")

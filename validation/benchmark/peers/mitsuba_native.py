@@ -25,9 +25,8 @@ def drawing(scene: Scene, variant: str, integrator: str, size: int, max_depth: i
     """
     with using(variant):
         shapes = mitsuba_scene.meshes(scene, [_bsdf(scene.materials[i.material]) for i in scene.instances])
-        emitters = [mitsuba_scene.emitter(light) for light in scene.lights] + [
-            mitsuba_scene.background(scene.background)
-        ]
+        emitters = [mitsuba_scene.emitter(light) for light in scene.all_lights]
+        emitters.append(mitsuba_scene.background(scene))
         loaded = mitsuba_scene.assemble(shapes, emitters)
         sensor = mi.load_dict(_sensor(scene, size))
         depth = {"max_depth": max_depth + 2, "rr_depth": 1000} if integrator == "path" else {}

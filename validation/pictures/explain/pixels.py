@@ -151,7 +151,7 @@ class Explainer:
         """Yields the faults of our own tree, whatever Mitsuba's is."""
         yield from wrong_sum(ours, color)
         if rule == "own":
-            yield from exactly.misplaced(ours, self._scene.lights)
+            yield from exactly.misplaced(ours, self._scene.all_lights)
         for place in wrong:
             yield f"{place.where}: no ray from there has our hit, face {place.ours.face} at {place.ours.t!r}"
 

@@ -103,12 +103,13 @@ def _passes(scene: Scene, max_depth: int) -> list[_Pass]:
     """One pass for each light, and one or two for radiance seen without lighting: their sum is the picture."""
     materials = [scene.materials[instance.material] for instance in scene.instances]
     passes = []
-    if scene.lights:
+    if scene.all_lights:
         lit = mitsuba_scene.meshes(scene, [phong.bsdf(material) for material in materials])
         passes = [
-            _Pass(mitsuba_scene.assemble(lit, [mitsuba_scene.emitter(light)]), max_depth + 2) for light in scene.lights
+            _Pass(mitsuba_scene.assemble(lit, [mitsuba_scene.emitter(light)]), max_depth + 2)
+            for light in scene.all_lights
         ]
-    sky = [mitsuba_scene.background(scene.background)] if any(scene.background) else []
+    sky = [mitsuba_scene.background(scene)] if scene.sky is not None or any(scene.background) else []
     glows = ambient.has_glow(scene)
     if sky or glows:
         unlit = mitsuba_scene.meshes(scene, [phong.unlit(material) for material in materials])

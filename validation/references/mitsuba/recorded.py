@@ -31,7 +31,7 @@ class _Recorded(Recursion):
             node.point, node.normal, node.shading = _vector(si.p), _vector(si.n), _vector(si.sh_frame.n)
             node.own = _vector(self.surfaces[si.shape].ambient)
         else:
-            node.own = _vector(self.background)
+            node.own = _vector(self.background.eval(si))
         return super().leaving(si, depth)
 
     def lit(self, si: mi.SurfaceInteraction3f, surface: Surface, light: int) -> mi.Color3f:

@@ -41,10 +41,10 @@ class Film:
         self._scene, self._size = scene, size
         # Each pass with the edges of its longest path beyond the bounces: one to the first surface, and one from the
         # last to the light.
-        self._passes = [(self._lit(index), 2) for index in range(len(scene.lights))]
-        if any(scene.background):
+        self._passes = [(self._lit(index), 2) for index in range(len(scene.all_lights))]
+        if scene.sky is not None or any(scene.background):
             dark = mitsuba_scene.meshes(scene, [_bsdf(scene, i.material, lit=False) for i in scene.instances])
-            self._passes.append((mitsuba_scene.assemble(dark, [mitsuba_scene.background(scene.background)]), 1))
+            self._passes.append((mitsuba_scene.assemble(dark, [mitsuba_scene.background(scene)]), 1))
 
     def render(self, samples: int, *, max_depth: int, sampler: Sampler, seed: int = 0) -> NDArray[np.float64]:
         """Linear radiance (size, size, 3) float64 by ``samples`` paths a pixel in each pass, ``max_depth`` bounces.
@@ -65,7 +65,7 @@ class Film:
         shapes = mitsuba_scene.meshes(
             self._scene, [_bsdf(self._scene, i.material, lit=True) for i in self._scene.instances]
         )
-        return mitsuba_scene.assemble(shapes, [mitsuba_scene.emitter(self._scene.lights[index], 1.0 / _FADED)])
+        return mitsuba_scene.assemble(shapes, [mitsuba_scene.emitter(self._scene.all_lights[index], 1.0 / _FADED)])
 
     def _sensor(self, samples: int, sampler: Sampler) -> dict[str, object]:
         camera = self._scene.camera

@@ -19,8 +19,12 @@ from renderer.mesh.mesh import Mesh
 from renderer.scene.camera import primary_rays, sample_offsets
 from renderer.scene.light import DirectionalLight, Light
 from renderer.scene.scene import Instance, Scene
+from renderer.scene.sky import Sky
 
 mi.set_variant("scalar_rgb")
+
+# So many that linear interpolation between them errs by less than float32 rounds.
+_SKY_ROWS = 4096
 
 Rays = tuple[NDArray[np.float64], NDArray[np.float64]]
 Rgb = Sequence[float]
@@ -79,9 +83,28 @@ def emitter(light: Light, scale: float = 1.0) -> mi.Emitter:
     )
 
 
-def background(color: Rgb) -> mi.Emitter:
-    """An emitter for the constant radiance that a ray sees when it leaves the scene."""
-    return mi.load_dict({"type": "constant", "radiance": _radiance(color, 1.0)})
+def background(scene: Scene) -> mi.Emitter:
+    """An emitter for the radiance that a ray sees when it leaves the scene."""
+    if scene.sky is None:
+        return mi.load_dict({"type": "constant", "radiance": _radiance(scene.background, 1.0)})
+    bitmap = mi.Bitmap(_gradient(scene.sky).astype(np.float32))
+    return mi.load_dict({"type": "envmap", "bitmap": bitmap, "to_world": _from_y_up(scene.up)})
+
+
+def _gradient(sky: Sky) -> NDArray[np.float64]:
+    """A map of the sky by latitude, (rows, 4, 3), from straight up to straight down."""
+    sine = np.cos((np.arange(_SKY_ROWS) + 0.5) * (pi / _SKY_ROWS))[:, None, None]
+    ground = sky.horizon if sky.ground is None else sky.ground
+    above = np.array(sky.horizon) + sine * (np.array(sky.zenith) - np.array(sky.horizon))
+    return np.broadcast_to(np.where(sine > 0.0, above, ground), (_SKY_ROWS, 4, 3))
+
+
+def _from_y_up(up: str) -> mi.ScalarTransform4f:
+    """A turn that takes the y axis to the axis ``up``; the map is the same all around."""
+    if up == "y":
+        return mi.ScalarTransform4f()
+    axis, angle = ([1.0, 0.0, 0.0], 90.0) if up == "z" else ([0.0, 0.0, 1.0], -90.0)
+    return mi.ScalarTransform4f().rotate(axis, angle)
 
 
 def meshes(scene: Scene, bsdfs: Sequence[mi.BSDF]) -> dict[mi.Mesh, int]:

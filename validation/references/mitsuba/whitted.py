@@ -62,7 +62,7 @@ class Recursion:
     scene: mi.Scene
     surfaces: dict[mi.Mesh, Surface]
     lights: tuple[mi.Emitter, ...]
-    background: mi.Color3f
+    background: mi.Emitter
     max_depth: int
     shadows: bool
 
@@ -72,7 +72,7 @@ class Recursion:
     def leaving(self, si: mi.SurfaceInteraction3f, depth: int) -> mi.Color3f:
         """The radiance that leaves what a ray hit, against the ray."""
         if not si.is_valid():
-            return self.background
+            return self.background.eval(si)
         surface = self.surfaces[si.shape]
         result = surface.ambient
         if surface.diffuse is not None or surface.specular is not None:
@@ -156,12 +156,12 @@ def recursion_of(
     surfaces = [_surface(scene.materials[i.material], scene.ambient) for i in scene.instances]
     # Mitsuba requires a BSDF for each shape, but only the surfaces' own lobes are sampled, so any will do.
     shapes = mitsuba_scene.meshes(scene, [mitsuba_scene.diffuse((0.0, 0.0, 0.0))] * len(surfaces))
-    lights = tuple(mitsuba_scene.emitter(light) for light in scene.lights)
+    lights = tuple(mitsuba_scene.emitter(light) for light in scene.all_lights)
     recursion = kind(
         mitsuba_scene.assemble(shapes, lights),
         {shape: surfaces[index] for shape, index in shapes.items()},
         lights,
-        mi.Color3f(*scene.background),
+        mitsuba_scene.background(scene),
         max_depth,
         scene.render.shadows,
     )

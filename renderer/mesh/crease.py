@@ -1,0 +1,75 @@
+"""Smooth normals that stop at sharp edges: vertices are split where an edge is sharper than an angle."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.errors import expect
+from renderer.mesh.edges import sides
+
+if TYPE_CHECKING:
+    from renderer.mesh.mesh import Mesh
+
+Indices = NDArray[np.int64]
+
+
+class Split:
+    """The vertices of a mesh, split at its sharp edges.
+
+    faces    (F, 3), the new vertex of each corner
+    vertices (n,), the old vertex of each new one
+    group    (3 F,), for each corner the number of those around its place that share a normal
+    """
+
+    def __init__(self, mesh: Mesh, angle: float) -> None:
+        expect(0.0 <= angle <= 180.0, "crease", "an angle from 0 to 180 degrees", repr(angle))
+        joined = _joined_corners(mesh, float(np.cos(np.radians(angle))))
+        _, self.group = np.unique(_components(3 * len(mesh.faces), *joined), return_inverse=True)
+        # Vertices at one place may differ in colour or texture, so that one group may have several.
+        keys = self.group.astype(np.int64) * max(len(mesh.vertices), 1) + mesh.faces.ravel()
+        _, first, corner = np.unique(keys, return_index=True, return_inverse=True)
+        self.faces = corner.reshape(-1, 3)
+        self.vertices = mesh.faces.ravel()[first]
+        self.group_of_vertex = self.group[first]
+
+
+def _joined_corners(mesh: Mesh, least: float) -> tuple[Indices, Indices]:
+    """Pairs of corners of faces that share an edge which is not sharp, at either end of it.
+
+    Faces without area have no normal, and no edge of theirs is sharp.
+    """
+    start, _, edge = sides(mesh.vertices, mesh.faces)
+    order = np.argsort(edge.ravel(), kind="stable")
+    same = edge.ravel()[order[1:]] == edge.ravel()[order[:-1]]
+    one, other = order[:-1][same], order[1:][same]
+    normals = mesh.face_normals()
+    flat = ~normals.any(axis=1)
+    cosine = np.einsum("nk,nk->n", normals[one // 3], normals[other // 3])
+    # rule: sharp-edge
+    smooth = (cosine >= least) | flat[one // 3] | flat[other // 3]
+    one, other = one[smooth], other[smooth]
+    back = start.ravel()[one] != start.ravel()[other]
+    near, far = np.where(back, _next(other), other), np.where(back, other, _next(other))
+    return np.concatenate([one, _next(one)]), np.concatenate([near, far])
+
+
+def _next(corner: Indices) -> Indices:
+    """The corner after each in its face."""
+    return corner - corner % 3 + (corner + 1) % 3
+
+
+def _components(count: int, one: Indices, other: Indices) -> Indices:
+    """The least number of the component of each of ``count`` nodes in the graph of these edges."""
+    label = np.arange(count)
+    while True:
+        least = np.minimum(label[one], label[other])
+        further = label.copy()
+        np.minimum.at(further, label[one], least)
+        np.minimum.at(further, label[other], least)
+        further = further[further]
+        if np.array_equal(further, label):
+            return label
+        label = further
