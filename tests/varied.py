@@ -28,6 +28,7 @@ from renderer.picture.image import CutWarning
 from renderer.scene.fields import Fields
 from renderer.scene.material import Dielectric, Mirror, Phong
 from renderer.scene.scene import Floor, RenderSettings, SceneObject
+from renderer.scene.sky import Sky
 
 Table = dict[str, Any]
 # A key of a scene file: names of tables, and places in lists.
@@ -79,12 +80,14 @@ OTHERS: dict[type[Fields], Table] = {
     Dielectric: {"type": _CHALK, "ior": 1.9, "reflectance": [0.5, 0.9, 0.2], "transmittance": [0.9, 0.3, 0.5]},
     DirectionalLight: {"type": _LAMP, "direction": [0.7, -0.9, -0.2], "irradiance": [0.9, 0.2, 0.4]},
     PointLight: {"type": _SUN, "position": [-1.5, 2.0, 2.5], "intensity": [6.0, 1.0, 2.0]},
-    SceneObject: {"mesh": "other.ply", "material": "chalk", "normals": "smooth", "scale": [0.5, 0.6, 0.9],
-                  "rotate": [40.0, 10.0, 60.0], "translate": [0.3, 0.9, 0.4]},
+    SceneObject: {"mesh": "other.ply", "material": "chalk", "normals": "smooth", "crease": 20.0,
+                  "scale": [0.5, 0.6, 0.9], "rotate": [40.0, 10.0, 60.0], "translate": [0.3, 0.9, 0.4]},
     Floor: {"min": [-2.5, -1.0], "max": [1.0, 2.5], "materials": ["chalk", "steel"], "squares": [5, 2]},
     RenderSettings: {"resolution": [9, 7], "samples": 9, "max_depth": 0, "min_weight": 0.25, "max_rays": 5,
                      "shadows": False},
-    Scene: {"ambient": [0.7, 0.1, 0.2], "background": [0.8, 0.1, 0.3], "up": "z"},
+    Sky: {"zenith": [0.9, 0.1, 0.2], "horizon": [0.1, 0.6, 0.3], "ground": [0.6, 0.1, 0.5], "lights": 5,
+          "sun": [0.6, -0.7, 0.1], "sun_irradiance": [0.9, 0.2, 0.6], "sun_angle": 40.0, "sun_lights": 2},
+    Scene: {"ambient": [0.7, 0.1, 0.2], "background": [0.8, 0.1, 0.3], "sky": {"lights": 4}, "up": "z"},
 }  # fmt: skip
 
 
@@ -148,11 +151,27 @@ def _walk(table: Table, value: Any, keys: Keys) -> Iterator[Variation]:
         if parts and all(isinstance(part, Fields) for part in parts):
             yield from _walk(table, field, (*keys, name))
         else:
-            yield Variation(table, type(value), (*keys, name), OTHERS[type(value)][name])
+            yield Variation(_where_seen(table, keys, name), type(value), (*keys, name), OTHERS[type(value)][name])
 
 
-# All of a scene, and those of its camera where that is of the other type.
+def _where_seen(table: Table, keys: Keys, name: str) -> Table:
+    """A table in which a field shows that does not show in ``table``."""
+    table = copy.deepcopy(table)
+    if name == "crease":
+        table["objects"][keys[1]]["normals"] = "smooth"
+    if name == "sky":
+        del table["background"]
+    return table
+
+
+# In place of the background.
+_SKY = {"zenith": [0.1, 0.2, 0.5], "horizon": [0.5, 0.4, 0.3], "ground": [0.2, 0.1, 0.1], "lights": 3,
+        "sun": [-0.5, -1.0, -0.3], "sun_irradiance": [0.4, 0.5, 0.3], "sun_angle": 10.0, "sun_lights": 3}  # fmt: skip
+_UNDER_SKY = {name: value for name, value in BASE.items() if name != "background"} | {"sky": _SKY}
+
+# All of a scene, those of its camera where that is of the other type, and those of a sky.
 VARIATIONS = list(_variations(BASE))
+VARIATIONS += [other for other in _variations(_UNDER_SKY) if other.keys[0] == "sky"]
 VARIATIONS += [other for other in _variations(BASE | {"camera": ORTHOGRAPHIC}) if other.keys[0] == "camera"]
 
 

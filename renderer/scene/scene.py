@@ -441,7 +441,7 @@ class Scene(Fields):
             placed += [Instance(m, name, False) for m, name in _floor_meshes(self.floor, UP_AXES[self.up])]
         return tuple(placed)
 
-    @lazy
+    @property
     def all_lights(self) -> tuple[Light, ...]:
         """The lights, then those of the sky.
 

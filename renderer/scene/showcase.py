@@ -1,25 +1,50 @@
-"""A scene for a mesh alone: a camera that sees all of it, a light, and a floor under it."""
+"""A scene for a mesh alone: a camera that sees all of it, a sky, and a floor that has no end."""
 
 import json
 import math
 from collections.abc import Iterable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from renderer.arguments.up import UP_AXES, turn_to
 from renderer.mesh.mesh import Mesh
+from renderer.scene.camera import unit
+from renderer.scene.sky import Sky
 
 # The ball around the mesh, seen from a little above and to the right, fills the picture's height less a tenth.
 _TOWARDS_EYE, _FOV, _MARGIN = (0.5, 0.4, 1.0), 40.0, 1.1
-# Half the side of the floor, in radii, and the number of its squares along a side.
-_FLOOR, _SQUARES = 4.0, 16
+# Half the side of the floor, in radii.
+_FLOOR = 6.0
+_MODEL, _FLOOR_GREY = (0.62, 0.56, 0.48), 0.75
+# Of the sky: radiance straight up; of the sun: the way of its light with y up, and its irradiance.
+_ZENITH, _SUN, _SUN_IRRADIANCE = (0.34, 0.39, 0.47), (-0.7, -1.0, -0.45), 0.65
+# Edges whose faces part by more are sharp.
+_CREASE = 30.0
+
+
+def _studio(up: str) -> Sky:
+    """A sky whose horizon has the radiance of the floor where nothing hides the sky, so that no edge of it shows.
+
+    That radiance is linear in that of the horizon, as the sky lights the floor.
+    """
+    sun = turn_to(up) @ _SUN
+    skies = [Sky(zenith=_ZENITH, horizon=h, sun=sun, sun_irradiance=_SUN_IRRADIANCE) for h in (0.0, 1.0)]
+    dark, light = (_FLOOR_GREY * _irradiance(sky, up) for sky in skies)
+    return skies[0].model_copy(update={"horizon": tuple((dark / (1.0 - (light - dark))).round(6).tolist())})
+
+
+def _irradiance(sky: Sky, up: str) -> NDArray[np.float64]:
+    """The light of a sky on level ground: red, green and blue."""
+    lights = sky.directional(up)
+    ways = np.array([unit(light.direction) for light in lights])
+    return -ways[:, UP_AXES[up]] @ np.array([light.irradiance for light in lights])
 
 
 def showcase_text(mesh: Mesh, path: str, up: str) -> str:
     """The scene file, as TOML, that shows ``mesh``; ``path`` is that of its file, as the scene file names it.
 
-    The mesh is moved so that it stands in the middle of the floor; ``up`` is the axis that points up. It is smooth
-    where its file has normals.
+    The mesh is moved so that it stands in the middle of the floor; ``up`` is the axis that points up.
     """
     lower, upper = mesh.bounds
     radius = float(np.linalg.norm(mesh.extent)) / 2.0 or 1.0
@@ -29,49 +54,48 @@ def showcase_text(mesh: Mesh, path: str, up: str) -> str:
     moved[axis] = -lower[axis]
     towards = turn @ _TOWARDS_EYE / np.linalg.norm(_TOWARDS_EYE)
     eye = target + towards * (_MARGIN * radius / math.sin(math.radians(_FOV) / 2.0))
-    half = _FLOOR * radius
+    half, sky = _FLOOR * radius, _studio(up)
     quoted = json.dumps(path).replace("\x7f", "\\u007f")  # as TOML has it
     return f"""# Made for {quoted}: change what you like.
 
 up = "{up}"
+ambient = 0.15
 
 [camera]
 eye = {_list(eye)}
 target = {_list(target)}
 fov = {_FOV}
 
+[render]
+samples = 4
+
 [[objects]]
 mesh = {quoted}
 material = "model"
-normals = "{"flat" if mesh.normals is None else "smooth"}"
+normals = "smooth"
+crease = {_CREASE}
 translate = {_list(moved)}
 
 [floor]
 min = {_list((-half, -half))}
 max = {_list((half, half))}
-squares = [{_SQUARES}, {_SQUARES}]
-materials = ["light", "dark"]
+materials = ["floor"]
 
 [materials.model]
-diffuse = [0.72, 0.68, 0.62]
-specular = 0.15
-shininess = 40.0
+diffuse = {_list(_MODEL)}
+specular = 0.05
+shininess = 30.0
 
-[materials.light]
-diffuse = 0.75
+[materials.floor]
+diffuse = {_FLOOR_GREY}
+ambient = 0.0
 
-[materials.dark]
-diffuse = 0.6
-
-[[lights]]
-type = "directional"
-direction = {_list(turn @ (-0.6, -1.0, -0.5))}
-irradiance = 0.75
-
-[[lights]]
-type = "directional"
-direction = {_list(turn @ (1.0, -0.6, -0.8))}
-irradiance = 0.25
+# The horizon is as bright as the floor, so that no edge shows between them.
+[sky]
+zenith = {_list(sky.zenith)}
+horizon = {_list(sky.horizon)}
+sun = {_list(turn_to(up) @ _SUN)}
+sun_irradiance = {_SUN_IRRADIANCE}
 """
 
 

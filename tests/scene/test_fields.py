@@ -21,6 +21,7 @@ from renderer import (
     Scene,
     SceneError,
     SceneObject,
+    Sky,
 )
 from renderer.mesh.shapes import box
 
@@ -42,7 +43,8 @@ pytestmark = [pytest.mark.filterwarnings("ignore::renderer.SceneWarning"), pytes
     "scene.objects.mesh", "scene.objects.normals", "scene.objects.rotate", "scene.objects.scale",
     "scene.objects.translate", "scene.render", "scene.render.max_depth", "scene.render.max_rays",
     "scene.render.min_weight", "scene.render.resolution", "scene.render.samples", "scene.render.shadows",
-    "scene.up",
+    "scene.sky", "scene.sky.ground", "scene.sky.horizon", "scene.sky.lights", "scene.sky.sun", "scene.sky.sun_angle",
+    "scene.sky.sun_irradiance", "scene.sky.sun_lights", "scene.sky.zenith", "scene.objects.crease", "scene.up",
 )]  # fmt: skip
 
 
@@ -60,6 +62,7 @@ LEAST: dict[type, dict[str, Any]] = {
     SceneObject: {"mesh": BOX, "material": "m"},
     Floor: {"min": (-1, -1), "max": (1, 1), "materials": ("m",)},
     RenderSettings: {},
+    Sky: {},
     Scene: {"camera": {"eye": (3, 4, 5), "target": (0, 0, 0)}, "materials": {"m": {}, "n": {}}},
 }
 
@@ -139,6 +142,7 @@ FIELDS: dict[type, dict[str, Field]] = {
     SceneObject: {
         "mesh": Field(NEEDED, [(BOX, BOX), ("a.ply", Path("a.ply")), (Path("b.stl"), Path("b.stl"))], [3, None, [BOX]]),
         "material": Field(NEEDED, same("m", "ü b"), [3, None, ["m"]]),
+        "crease": number(180.0, 0.0, 180.0, refused=(-TINY, math.nextafter(180, BEYOND), BEYOND)),
         "normals": Field("flat", same("flat", "smooth"), ["Flat", "", None, True]),
         "scale": triple((1.0, 1.0, 1.0))._replace(
             takes=[*same((1.0, -2.0, 0.5)), (2, (2.0, 2.0, 2.0)), (-0.5, (-0.5, -0.5, -0.5))],
@@ -167,6 +171,15 @@ FIELDS: dict[type, dict[str, Field]] = {
         "max_rays": Field(16384, same(1, 2**62 - 1), [0, -1, 2**62, 1.5, True, "3", None]),
         "shadows": Field(True, same(True, False), [0, 1, "yes", None]),
     },
+    Sky: {
+        "zenith": colour((0.35, 0.55, 0.9)), "horizon": colour((0.85, 0.9, 0.95)),
+        "ground": colour(None)._replace(takes=[*colour(None).takes, (None, None)]),
+        "lights": Field(96, same(0, 1, 4096), [-1, 4097, 1.0, True, "3", None]),
+        "sun": triple(None, (0, 0, 0))._replace(takes=[*triple(None).takes, (None, None)]),
+        "sun_irradiance": colour((1.0, 1.0, 1.0)),
+        "sun_angle": number(8.0, 0.0, 45.0, refused=(-TINY, math.nextafter(45, BEYOND), BEYOND)),
+        "sun_lights": Field(16, same(1, 4096), [0, 4097, 1.0, True, "3", None]),
+    },
     Scene: {
         "camera": Field(NEEDED, [
             (LEAST[PerspectiveCamera], PerspectiveCamera(**LEAST[PerspectiveCamera])),
@@ -187,6 +200,7 @@ FIELDS: dict[type, dict[str, Field]] = {
             (None, None), (LEAST[Floor], Floor(**LEAST[Floor])),
         ], [3, [], {}, {**LEAST[Floor], "materials": ["gold"]}]),
         "ambient": colour((0.0, 0.0, 0.0)), "background": colour((0.0, 0.0, 0.0)),
+        "sky": Field(None, [(None, None), ({}, Sky()), ({"lights": 3}, Sky(lights=3))], [3, [], {"lights": -1}]),
         "up": Field("y", same("x", "y", "z"), ["w", "Y", "", 1, None, ["y"]]),
         "render": Field(RenderSettings(), [
             ({}, RenderSettings()), ({"samples": 9}, RenderSettings(samples=9)),

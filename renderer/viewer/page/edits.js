@@ -110,7 +110,7 @@ export class Edits {
     const materials = this.named.map(([name, fields]) => ({ name, diffuse: BLACK, specular: BLACK,
       reflectance: BLACK, transmittance: BLACK, shininess: 0, ...fields, fields }));
     const lights = this.now.lights.map((fields) => ({ ...fields, color: fields.irradiance ?? fields.intensity }));
-    return { ...this.scene, materials, lights };
+    return { ...this.scene, materials, lights: [...lights, ...this.scene.skylights] };
   }
 
   show() {
