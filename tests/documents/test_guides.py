@@ -16,6 +16,7 @@ from renderer.scene.camera import OrthographicCamera, PerspectiveCamera
 from renderer.scene.light import DirectionalLight, PointLight
 from renderer.scene.material import Dielectric, Mirror, Phong
 from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject
+from renderer.scene.sky import Sky
 from renderer.viewer import protocol
 from validation.__main__ import make_parser as validation_parser
 
@@ -51,10 +52,16 @@ KINDS: dict[str, tuple[type, Place, dict[str, Any]]] = {
     "[[lights]], directional": (DirectionalLight, ("lights", 0), {"type": "directional", "direction": [0, -1, 0]}),
     "[[lights]], point": (PointLight, ("lights", 0), {"type": "point", "position": [0, 1, 0]}),
     "[[objects]]": (SceneObject, ("objects", 0), {"mesh": box(), "material": "NAME"}),
+    "[sky]": (Sky, ("sky",), {}),
     "[floor]": (Floor, ("floor",), {"min": [0, 0], "max": [1, 1], "materials": ["NAME"]}),
 }
 # Defaults that are words.
-WORDS: dict[str, Any] = {"none": (None, ()), "as `diffuse`": (None,), "all defaults": (RenderSettings(),)}
+WORDS: dict[str, Any] = {
+    "none": (None, ()),
+    "as `diffuse`": (None,),
+    "as `horizon`": (None,),
+    "all defaults": (RenderSettings(),),
+}
 
 
 PYTHON = re.compile(r"```python\n(.*?)```", re.DOTALL)

@@ -34,6 +34,7 @@ from validation.promises.pictures.placing import check_placing
 from validation.promises.pictures.refraction import check_refraction
 from validation.promises.pictures.saved import check_saved
 from validation.promises.pictures.shining import check_shining
+from validation.promises.pictures.skies import check_skies
 from validation.promises.queries.angles import check_angles, check_halves
 from validation.promises.queries.edges import check_edges
 from validation.promises.queries.inside import check_inside
@@ -126,6 +127,7 @@ PICTURES = {
     ),
     "bounces": Check(check_bounces, ("scene.render.max_depth", "scene.render.min_weight", "prepare")),
     "lights": Check(check_shining, ("DirectionalLight", "PointLight")),
+    "skies": Check(check_skies, ("Sky", "scene.sky", "Scene.all_lights", "Mesh.creased", "scene.objects.crease")),
     "planes of pictures": Check(lambda: check_images(_random()), ("Image", "scene.render.max_rays")),
     "files of pictures": Check(check_saved, ("Image.save",)),
     "nested media": Check(check_nesting, ("Dielectric",)),

@@ -57,6 +57,9 @@ def draw_scene(rng: Generator) -> Drawn:
     if rng.random() < 0.7:
         table["materials"] |= {"light": {"diffuse": 0.6}, "dark": {"diffuse": 0.15, "reflectance": 0.2}}
         table["floor"] = _floor(rng)
+    if rng.random() < 0.2:
+        del table["background"]
+        table["sky"] = _sky(rng)
     return Drawn(table, meshes)
 
 
@@ -110,6 +113,16 @@ def _light(rng: Generator) -> Table:
         "position": _numbers(rng.uniform([-4.0, 0.5, -4.0], [4.0, 5.0, 4.0])),
         "intensity": _numbers(rng.uniform(2.0, 20.0) * np.array(_color(rng, 0.5))),
     }
+
+
+def _sky(rng: Generator) -> Table:
+    """Few lights, as each takes Mitsuba as long as any other."""
+    colors = {name: _color(rng) for name in ("zenith", "horizon", "ground")}
+    sky: Table = {**colors, "lights": int(rng.integers(0, 4))}
+    if rng.random() < 0.5:
+        sky |= {"sun": _numbers(rng.uniform([-1.0, -1.0, -1.0], [1.0, -0.4, 1.0])), "sun_irradiance": _color(rng)}
+        sky |= {"sun_angle": _rounded(rng.uniform(0.0, 20.0)), "sun_lights": int(rng.integers(1, 4))}
+    return sky
 
 
 def _object(rng: Generator, name: str, mesh: Mesh, material: str, kind: str) -> Table:

@@ -231,6 +231,9 @@ _CHANGES: dict[str, Change] = {
     "light passes an opaque face that glass touches": Rule("opaque-stops-light", drop),
     "bodies that touch have air between them": Rule("touching-bodies", compare(">=", "0")),
     "where bodies touch a ray comes from air": Rule("medium-of-crossing", element(2, "1.0")),
+    "the sky upside down": Rule("sky-gradient", value("-_")),
+    "a light of the sky missing": after("Sky.directional", lambda lights: lights[:-1]),
+    "no edge is too sharp to be smooth": Rule("sharp-edge", value("_ | True")),
     "edges count as the inside of their faces": Rule("slack-on-edges", choice(test="True")),
 }
 PICTURES = tuple(Defect("pictures", name, change) for name, change in _CHANGES.items())
