@@ -148,7 +148,7 @@ def command(case: Case) -> tuple[Any, Any]:
 def save(case: Case) -> tuple[Any, Any]:
     assert case.shown.path is not None
     path = case.shown.path.with_name("saved.toml")
-    path.write_text(scene_text(case.shown, case.message("save"))[0])
+    path.write_text(scene_text(case.shown, case.message("save")).text)
     return picture(load_scene(path), resolution=case.size).radiance, case.picture().radiance
 
 

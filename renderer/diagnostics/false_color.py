@@ -1,5 +1,7 @@
 """The AOVs of a picture drawn as colours: depth, normal, face, and the cost of each pixel."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,7 +9,7 @@ from renderer.errors import expect
 from renderer.mesh.colormaps import VIRIDIS, shades_of, step_of
 from renderer.picture.image import Image, srgb
 
-__all__ = ["AOVS", "VIRIDIS", "false_color", "limits_of", "scale_colors", "shades_of"]
+__all__ = ["AOVS", "VIRIDIS", "false_color", "limits_of", "limits_of_counts", "scale_colors", "shades_of"]
 
 AOVS = "color", "depth", "normal", "face", "cost"
 Limits = tuple[float, float]
@@ -55,14 +57,23 @@ def false_color(image: Image, aov: str, limits: Limits | None = None, faces: int
 
 
 def limits_of(image: Image, aov: str) -> Limits:
-    """Least and greatest depth of a surface, or least and greatest cost: the ends of a legend's scale.
+    """Least and greatest depth of a surface, or ``limits_of_counts`` of the cost: the ends of a legend's scale.
 
     (0, 0) for other AOVs and where there is nothing.
     """
     if aov not in ("depth", "cost"):  # whose picture may lack these planes
         return (0.0, 0.0)
-    values = image.rays if aov == "cost" else image.depth[image.face >= 0]
+    if aov == "cost":
+        return limits_of_counts(image.rays)
+    values = image.depth[image.face >= 0]
     return (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
+
+
+def limits_of_counts(counts: NDArray[np.integer[Any]]) -> Limits:
+    """The least count and the one that 1 % of pixels exceed: a few of them would leave all others in one colour."""
+    if not counts.size:
+        return (0.0, 0.0)
+    return float(counts.min()), float(np.percentile(counts, 99.0, method="higher"))
 
 
 def scale_colors(aov: str) -> NDArray[np.uint8]:

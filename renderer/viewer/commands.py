@@ -9,14 +9,18 @@ from collections.abc import Iterator, Sequence
 from functools import reduce
 from operator import getitem
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from renderer.errors import expect
+from renderer.mesh.load import MESH_SUFFIXES
+from renderer.mesh.mesh import Mesh
 from renderer.scene.camera import Camera, OrthographicCamera
 from renderer.scene.fields import Fields
 from renderer.scene.light import DirectionalLight, Light
+from renderer.scene.scene import Scene
+from renderer.scene.showcase import showcase_text
 from renderer.system.files import read_whole
 from renderer.viewer.protocol import AskCommand, SaveCamera, SaveScene, ViewSettings
 from renderer.viewer.shown import ShownScene, edited
@@ -102,17 +106,28 @@ def _distances(ahead: float) -> Iterator[float]:
     return iter(sorted(about, key=lambda distance: abs(distance - ahead)))
 
 
-def scene_text(shown: ShownScene, asked: SaveScene) -> tuple[str, str]:
-    """The scene's file with the view's camera, materials, lights and settings, and a diff to it from the file.
+class SceneText(NamedTuple):
+    """A scene file: its name, its text, and a diff to it from the file that is there."""
 
-    What is not changed stays as it is written, comments and ends of lines too; so do objects that are hidden. Raises
-    ``ValueError`` for a scene of no such file, and for a file that cannot be read or changed.
+    name: str
+    text: str
+    diff: str
+
+
+def scene_text(shown: ShownScene, asked: SaveScene) -> SceneText:
+    """The scene's file with the view's camera, materials, lights and settings.
+
+    What is not changed stays as it is written, comments and ends of lines too; so do objects that are hidden. A mesh
+    file gets a scene file, all of which is new. Raises ``ValueError`` for a scene of no file, and for a file that
+    cannot be read or changed.
     """
     path = shown.path
-    told = "a scene that was made in Python" if path is None else str(path)
-    expect(path is not None and path.suffix.lower() == ".toml", "save", "a scene file", told)
+    expect(path is not None, "save", "a scene file or a mesh file", "a scene that was made in Python")
     assert path is not None  # which mypy cannot tell
     expect(not shown.edited, "save", "the file as it was loaded", "one that was edited since")
+    if path.suffix.lower() in MESH_SUFFIXES:
+        made = _changed_text(_made_for(shown.whole.scene, path.name), shown, asked)
+        return SceneText(f"{path.stem}.toml", made, _diff("", made, path.name))
     written = _text_of(path)
     # tomlkit knows no mark of a text's order of bytes, and ends the lines that it adds with a line feed.
     mark, before = ("\ufeff", written[1:]) if written.startswith("\ufeff") else ("", written)
@@ -120,8 +135,19 @@ def scene_text(shown: ShownScene, asked: SaveScene) -> tuple[str, str]:
     if returns:
         before = before.replace("\r\n", "\n")
     after = _changed_text(before, shown, asked)
-    lines = difflib.unified_diff(before.splitlines(), after.splitlines(), path.name, "as shown", lineterm="")
-    return mark + (after.replace("\n", "\r\n") if returns else after), "\n".join(lines)
+    text = mark + (after.replace("\n", "\r\n") if returns else after)
+    return SceneText(path.name, text, _diff(before, after, path.name))
+
+
+def _diff(before: str, after: str, name: str) -> str:
+    return "\n".join(difflib.unified_diff(before.splitlines(), after.splitlines(), name, "as shown", lineterm=""))
+
+
+def _made_for(scene: Scene, name: str) -> str:
+    """The scene file of the scene that ``load_scene`` put around a mesh file of that name."""
+    (mesh,) = (thing.mesh for thing in scene.objects)
+    assert isinstance(mesh, Mesh)
+    return showcase_text(mesh, name, scene.up)
 
 
 def _text_of(path: Path) -> str:

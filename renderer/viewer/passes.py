@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.diagnostics.face_phong import face_colors
-from renderer.diagnostics.false_color import Limits, false_color, limits_of, scale_colors, shades_of
+from renderer.diagnostics.false_color import Limits, false_color, limits_of, limits_of_counts, scale_colors, shades_of
 from renderer.diagnostics.ray_cost import camera_steps
 from renderer.picture.encoding import encoded
 from renderer.picture.image import Image, srgb
@@ -230,7 +230,7 @@ def _steps(
     prepared = shown.brute if view.mode == "brute" else shown.prepared
     camera = camera_of(view.m, view.fovy, height=view.height)
     counts = getattr(camera_steps(prepared, camera, wanted.size, finished), view.settings.aov)
-    low, high = float(counts.min()), float(counts.max())
+    low, high = limits_of_counts(counts)
     return shades_of(counts, low, high), (low, high), counts.size / (time.perf_counter() - began)
 
 

@@ -96,7 +96,7 @@ class ViewSettings(_Message):
     aov: Literal["color", "depth", "normal", "face", "cost", "nodes", "triangles"] = "color"
     light: FiniteVector | None = None
     pixels: Literal["rgba", "jpeg"] = "rgba"
-    pair: Annotated[str, Field(min_length=1, max_length=40)] = "brute"
+    pair: Annotated[str, Field(min_length=1, max_length=40)] = "samples"
     edits: Edits = Edits()
 
     @field_validator("samples", "refine")

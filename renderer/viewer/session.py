@@ -297,8 +297,7 @@ class Session:
             asked, shown = await self.saves.take(), self.shown
             try:
                 running = asyncio.get_running_loop().run_in_executor(self.threads, scene_text, shown, asked)
-                text, diff = await running
-                await self._tell(type="saved", name=shown.name, text=text, diff=diff)
+                await self._tell(type="saved", **(await running)._asdict())
             except Exception as error:  # as above
                 await self.complain(error)
 

@@ -61,6 +61,7 @@ def test_brute_force_begins_with_the_octrees_picture(odd: Viewer) -> None:
     """It is the same one; WebGL's model stood there for the seconds that brute force took."""
     odd.page.evaluate(WATCH)
     odd.choose("brute")
+    odd.page.wait_for_selector("#until:not([hidden])")
     assert set(odd.page.evaluate(WATCHED)) == {odd.camera["w"]}
 
 

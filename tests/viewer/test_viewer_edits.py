@@ -18,6 +18,7 @@ from viewer_page import SCENE
 import renderer
 from renderer import DirectionalLight, Mirror, Phong, PointLight, Scene, SceneObject, load_scene
 from renderer.cli.main import main
+from renderer.mesh.load import save_ply
 from renderer.mesh.shapes import icosphere
 from renderer.picture.image import srgb
 from renderer.scene.camera import PerspectiveCamera
@@ -213,13 +214,26 @@ def test_lights_that_come_and_go_are_saved(client: Client, scene: Path, number: 
     assert again.lights == (LAMP,) * number and again.floor == load_scene(scene).floor
 
 
+def test_a_mesh_file_is_saved_as_the_scene_that_is_seen(tmp_path: Path) -> None:
+    path = tmp_path / "ball.ply"
+    save_ply(icosphere(2), path)
+    with renderer.view(path, browser=False) as viewing, Client(viewing.url) as client:
+        told = saved(client)
+    copy = tmp_path / told["name"]
+    assert copy.name == "ball.toml" and all(line[0] in "+-@" for line in told["diff"].splitlines())
+    copy.write_text(told["text"])
+    again, made = load_scene(copy), load_scene(path)
+    np.testing.assert_allclose(again.camera.eye, (0.5, 2.6, 5.5))
+    assert again.sky == made.sky and again.floor == made.floor and again.objects[0].crease == made.objects[0].crease
+
+
 def test_a_scene_without_a_file_and_one_edited_meanwhile_are_not_saved(tmp_path: Path) -> None:
     ball = SceneObject(mesh=icosphere(1), material="grey")
     eye = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
     made = Scene(camera=eye, materials={"grey": Phong()}, objects=[ball])
     with renderer.view(made, browser=False) as viewing, Client(viewing.url) as client:
         client.send(**{"type": "save", **looking((0.5, 2.6, 5.5))})
-        assert "save: expected a scene file" in client.told("error")["message"]
+        assert "save: expected a scene file or a mesh file" in client.told("error")["message"]
     path = tmp_path / "blocks.toml"
     path.write_text(SCENE)
     with renderer.view(path, browser=False) as viewing, Client(viewing.url) as client:

@@ -41,7 +41,7 @@ function values({ at, of, values: [one, other], same_rays: same }) {
   const rays = same === null ? `${counts} rays` : `${same ? "the same" : "not the same"} ${counts} rays`;
   const where = `pixel ${at.join(", ")} of ${of.join(" × ")}`;
   const said = identical ? `Identical to the bit, ${rays}; ${where}` : `Different, ${rays}; ${where}`;
-  return [element("h2", { textContent: "Proof" }), table, element("p", { className: "note", textContent: said })];
+  return [element("h2", { textContent: "Comparison" }), table, element("p", { className: "note", textContent: said })];
 }
 
 // The nodes that the camera ray visited, as bars from the root's level down.

@@ -25,7 +25,7 @@ export class Legend {
     const bar = element("i", { className: "scale" });
     bar.style.background = `linear-gradient(to right, ${colors.map((c) => `rgb(${c.join(" ")})`).join(", ")})`;
     const same = aov === "difference" ? [element("span", {}, element("i", { className: "swatch none" }), "identical")] : [];
-    const ends = element("div", { className: "ends" }, element("span", {}, value(aov, low)), ...same, element("span", {}, value(aov, high)));
+    const ends = element("div", { className: "ends" }, element("span", {}, value(aov, low)), ...same, element("span", {}, WHOLE.includes(aov) ? `${value(aov, high)} or more` : value(aov, high)));
     this.box.replaceChildren(element("b", { textContent: NAMES[aov] }), bar, ends);
   }
 }

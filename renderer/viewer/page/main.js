@@ -268,7 +268,7 @@ class Viewer {
       input.parentElement.title = `Needs WebGL2: ${reason}`;
     }
     this.panel.offerBoxes(false);
-    this.notices.say(`GL lighting, own Phong, boxes and ray paths need WebGL2: ${reason}. Ray tracing works.`);
+    this.notices.say(`Preview, Flat Phong, boxes and ray paths need WebGL2: ${reason}. Ray tracing works.`);
   }
 
   // The browser took WebGL away, as it may when the graphics driver restarts.
@@ -474,6 +474,7 @@ class Viewer {
     const live = current || (traced && this.recent);
     this.picture.visible = live;
     this.legend.show(live ? this.shown.legend : null);
+    find("#until").hidden = !live || this.shown.view.mode === this.mode;
     this.model = traced && !live && Boolean(this.layer?.loaded);
     this.stage.classList.toggle("waiting", traced && !live);
     if (this.layer) {

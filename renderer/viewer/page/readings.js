@@ -65,7 +65,7 @@ export class Readings {
     const [time, shown] = [milliseconds(ms), `after ${milliseconds(late)}`];
     const ends = legend ? scale(legend) : "–";
     if (kind === FACE_COLORS) {
-      this.line.textContent = `own Phong · ${count(faces)} colours in ${time}`;
+      this.line.textContent = `flat Phong · ${count(faces)} colours in ${time}`;
       return this.read({ picture: `${count(faces)} colours`, pass: "–", time, shown, speed: "–", scale: ends });
     }
     const speed = kind === PROOF ? "–" : pace(rate);

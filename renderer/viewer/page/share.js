@@ -69,7 +69,7 @@ export class Share {
     viewer.layer.draw(viewer.view(), drawing(viewer.shading, NO_BOXES, NO_RAYS));
     copy.getContext("2d").drawImage(canvas, 0, 0);
     viewer.draw();
-    return { canvas: copy, view: viewer.view(), mode: viewer.mode === "phong" ? name : "GL lighting" };
+    return { canvas: copy, view: viewer.view(), mode: viewer.mode === "phong" ? name : "Preview" };
   }
 }
 

@@ -36,7 +36,7 @@ export class Sharing {
     this.exports = new Exports({
       send: (message) => viewer.connection.send(message),
       shown: (done) => this.showProgress(done),
-      made: (blob, name) => this.saved(blob, name),
+      made: (blob, name) => this.saved(blob, name, this.note),
     });
     this.file = button("share-file", "Save as one file", "Picture, model, boxes and ray as an HTML page that needs no server",
       () => this.saveFile());
@@ -82,13 +82,18 @@ export class Sharing {
     const { w, h } = this.viewer.size;
     const [width, height] = this.size.value.split("x").map(Number);
     const size = height ? { w: width, h: height } : allowed([w * width, h * width]);
-    this.ask({ type: "still", ...this.asked, ...size }, `-${size.w}x${size.h}.png`);
+    const { settings } = this.asked;
+    // As many as the view has once it rests.
+    const samples = settings.aov === "color" ? Math.max(settings.samples, settings.refine) : settings.samples;
+    this.note = samples > 1 ? `${samples} samples a pixel.` : "One sample a pixel.";
+    this.ask({ type: "still", ...this.asked, settings: { ...settings, samples }, ...size }, `-${size.w}x${size.h}.png`);
   }
 
   askTurntable() {
     const { size, camera } = this.viewer;
     const h = Number(this.height.value);
     const [format, frames] = [this.format.value, Number(this.frames.value)];
+    this.note = "";
     const turn = { pivot: camera.pivot, axis: camera.axes[1], frames, format };
     const film = allowed([(h * size.w) / size.h, h]);
     this.ask({ type: "turntable", ...this.asked, ...film, ...turn }, `-turntable.${format}`);
