@@ -43,10 +43,10 @@ def _joined_corners(mesh: Mesh, least: float) -> tuple[Indices, Indices]:
     """
     start, _, edge = sides(mesh.vertices, mesh.faces)
     order = np.argsort(edge.ravel(), kind="stable")
-    same = edge.ravel()[order[1:]] == edge.ravel()[order[:-1]]
-    one, other = order[:-1][same], order[1:][same]
+    same = np.flatnonzero(np.diff(edge.ravel()[order]) == 0)
+    one, other = order[same], order[same + 1]
     normals = mesh.face_normals()
-    flat = ~normals.any(axis=1)
+    flat = np.equal(np.abs(normals).max(axis=1, initial=0.0), 0.0)
     cosine = np.einsum("nk,nk->n", normals[one // 3], normals[other // 3])
     # rule: sharp-edge
     smooth = (cosine >= least) | flat[one // 3] | flat[other // 3]

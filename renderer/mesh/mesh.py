@@ -440,12 +440,9 @@ class Mesh:
         """
         split = Split(self, angle)
         means = self._mean_normals(split.group, int(split.group.max(initial=-1)) + 1)
-        kept = {
-            name: None if (values := getattr(self, name)) is None else values[split.vertices]
-            for name in ("colors", "texcoords")
-        }
+        colors, texcoords = (None if a is None else a[split.vertices] for a in (self.colors, self.texcoords))
         normals = means[split.group_of_vertex]
-        made = Mesh(self.vertices[split.vertices], split.faces, normals, name=self.name, **kept)
+        made = Mesh(self.vertices[split.vertices], split.faces, normals, colors, texcoords, self.name)
         return give_parts(made, self._parts)
 
     def _mean_normals(self, group: NDArray[np.integer[Any]], count: int) -> Float64Array:

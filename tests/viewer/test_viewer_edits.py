@@ -245,7 +245,8 @@ def test_a_scene_without_a_file_and_one_edited_meanwhile_are_not_saved(tmp_path:
 def text_of(shown: ShownScene, view: dict[str, Any], edits: dict[str, Any] | None = None) -> tuple[str, str]:
     """The scene's file as it is saved for that view, and the diff."""
     settings = {"max_depth": 3, "edits": edits or {}}
-    return scene_text(shown, SaveScene.model_validate_json(json.dumps({"type": "save", **view, "settings": settings})))
+    asked = SaveScene.model_validate_json(json.dumps({"type": "save", **view, "settings": settings}))
+    return scene_text(shown, asked)[1:]
 
 
 RED_TABLE = """[materials.red]
