@@ -131,13 +131,14 @@ class Steps:
             return []
         aims = []
         for light in range(len(self.arrays.lights)):
-            seen, (o, way, t_max) = aim_from(self.arrays, met.surface, met.n, light, self.offset)
+            spot = Spot(int(met.place.face), met.place.u, met.place.v)
+            seen, (o, way, t_max), is_off = aim_from(self.arrays, met.surface, spot, met.n, light, self.offset)
             if not seen.faces:
                 continue
             end = self.beyond(o, way) if seen.directional else seen.place
             share = phong_of(self.arrays, met.row, met.n, ray.direction, seen.towards)
             radiance = times(ray.weight, times(share, seen.arriving))
-            start = self._start(met.place, met.surface.n_g, way, ray.direction)
+            start = _NO_START if is_off else self._start(met.place, met.surface.n_g, way, ray.direction)
             aims.append(Aim(light, o, way, float(t_max), end, radiance, start))
         return aims
 

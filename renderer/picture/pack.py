@@ -43,6 +43,7 @@ def pack(scene: Scene, needs: Features | None = None) -> tuple[Mesh, SceneArrays
         sky=np.zeros((0, 3)) if scene.sky is None else scene.sky.rows(scene.up),
         media=media_around(scene, scene.camera) if needs.refraction else np.zeros(0, np.int64),
         touching=np.zeros(0, np.uint8),
+        soft=scene.render.terminator == "soft",
     )
     return mesh, arrays
 

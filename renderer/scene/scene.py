@@ -89,11 +89,19 @@ class RenderSettings(Fields):
         than full branching makes in ten bounces under three lights.
     shadows : bool, default True
         Whether surfaces hide lights. If not, no shadow rays are traced.
+    terminator : {"hard", "soft"}, default "hard"
+        Where a smooth surface turns away from a light, its flat faces hide the light from one another: dark teeth show.
+        "soft" starts shadow rays on the smooth surface above the faces. It also draws no dark dots at outlines. Flat
+        surfaces stay as they are.
 
     Raises
     ------
     SceneError
         For a value out of its range.
+
+    References
+    ----------
+    Hanika, Hacking the Shadow Terminator, in Ray Tracing Gems II, 2021, for the soft terminator.
 
     Examples
     --------
@@ -108,6 +116,7 @@ class RenderSettings(Fields):
     min_weight: Annotated[float, Field(ge=0.0, lt=1.0, strict=True)] = 0.0
     max_rays: Annotated[int, Field(ge=1, le=UNLIMITED_RAYS, strict=True)] = 16384
     shadows: Annotated[bool, Field(strict=True)] = True
+    terminator: Literal["hard", "soft"] = "hard"
 
     @stated
     def __init__(
@@ -119,6 +128,7 @@ class RenderSettings(Fields):
         min_weight: float = 0.0,
         max_rays: int = 16384,
         shadows: bool = True,
+        terminator: Literal["hard", "soft"] = "hard",
     ) -> None: ...
 
     @model_validator(mode="after")
@@ -139,6 +149,7 @@ class GivenSettings(TypedDict, total=False):
     min_weight: float | None
     max_rays: int | None
     shadows: bool | None
+    terminator: Literal["hard", "soft"] | None
 
 
 def checked_settings(defaults: RenderSettings, given: Mapping[str, Any]) -> RenderSettings:

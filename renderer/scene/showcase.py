@@ -19,8 +19,9 @@ _FLOOR = 6.0
 _MODEL, _FLOOR_GREY = (0.62, 0.56, 0.48), 0.75
 # Of the sky: radiance straight up; of the sun: the way of its light with y up, and its irradiance.
 _ZENITH, _SUN, _SUN_IRRADIANCE = (0.34, 0.39, 0.47), (-0.7, -1.0, -0.45), 0.65
-# Edges whose faces part by more are sharp.
-_CREASE = 30.0
+# Edges whose faces part by more are sharp: chamfers of 45 degrees are, and few edges of scans, whose sharp ones show as
+# teeth.
+_CREASE = 40.0
 
 
 def _studio(up: str) -> Sky:
@@ -68,6 +69,7 @@ fov = {_FOV}
 
 [render]
 samples = 4
+terminator = "soft"
 
 [[objects]]
 mesh = {quoted}

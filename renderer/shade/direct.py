@@ -9,11 +9,11 @@ from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import load, offset, store
 from renderer.numerics.vec3 import add, put3, row3, three, times
 from renderer.shade.bundle import SIZE
-from renderer.shade.lights import aim, see_light
+from renderer.shade.lights import aim, aim_off, see_light
 from renderer.shade.records import DIELECTRIC, KIND, MIRROR, UNLIT
-from renderer.shade.surface import bounds_at, phong
+from renderer.shade.surface import bounds_at, phong, raised
 from renderer.trace.rays import RayPointers
-from renderer.trace.spawn import Facet, Place, put_start
+from renderer.trace.spawn import Facet, Place, put_no_start, put_start
 from renderer.trace.starts.record import ROW, StartPointers
 from renderer.trace.traverse import trace_rays
 
@@ -86,12 +86,17 @@ def _aim_all(scene, bundle, surfaces, lit, count, light, rule, shadows):
         )
         seen = see_light(scene.lights, light, p, n, error)
         if seen.faces:
-            ray = aim(seen, p, n_g, error, rule)
+            start, d, place = offset(shadows, _START + ROW * aimed), row3(bundle.directions, i), place_of(surface)
+            above = raised(scene, np.int64(place.face), place.u, place.v, p, n)
+            if above.is_off:
+                ray = aim_off(seen, above.point)
+                put_no_start(start)
+            else:
+                ray = aim(seen, p, n_g, error, rule)
+                put_start(start, place, n_g, ray.direction, d, rule)
             put3(shadows, _ORIGIN + 3 * aimed, ray.origin)
             put3(shadows, _DIRECTION + 3 * aimed, ray.direction)
             store(shadows, _T_MAX + aimed, ray.t_max)
-            start, d = offset(shadows, _START + ROW * aimed), row3(bundle.directions, i)
-            put_start(start, place_of(surface), n_g, ray.direction, d, rule)
             put3(shadows, _TOWARDS + 3 * aimed, seen.towards)
             put3(shadows, _ARRIVING + 3 * aimed, seen.arriving)
             store(lit, SIZE + aimed, i)
@@ -140,4 +145,5 @@ def light_surfaces(tree, scene, bundle, surfaces, lit, settings, scratch):
             # rule: shadows
             if not (settings.shadows and load(scratch.found.hit, k)):
                 towards, arriving = three(shadows, _TOWARDS + 3 * k), three(shadows, _ARRIVING + 3 * k)
-                _add_light(scene, bundle, offset(surfaces, i * SURFACE_DOUBLES), i, towards, arriving)
+                surface = offset(surfaces, i * SURFACE_DOUBLES)
+                _add_light(scene, bundle, surface, i, towards, arriving)

@@ -8,7 +8,7 @@ from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import load
 from renderer.numerics.vec3 import dot, normalized, scale, sub, three
 from renderer.shade.records import DIRECTIONAL, LIGHT_COLUMNS
-from renderer.shade.surface import scene_pointers
+from renderer.shade.surface import raised, scene_pointers
 from renderer.trace.spawn import spawn_origin
 
 # A surface at the light must not hide it. Its t errs by some 32 u over the angle at which the ray meets it; 2^-36
@@ -73,8 +73,22 @@ def aim(seen, p, n_g, error, offset):
     return ShadowRay(o, sub(seen.place, o), t_max)
 
 
+@inlined
+def aim_off(seen, p):
+    """The ``ShadowRay`` from a point p that lies on no surface."""
+    if seen.directional:
+        return ShadowRay(p, seen.place, np.inf)
+    return ShadowRay(p, sub(seen.place, p), SHORT_OF_LIGHT)
+
+
 @kernel
-def aim_from(arrays, surface, n, light, offset):
-    """For Python: a ``SeenLight`` from a ``Surface`` with normal n, and the shadow ray by an offset rule."""
-    seen = see_light(scene_pointers(arrays).lights, light, surface.p, n, surface.error)
-    return seen, aim(seen, surface.p, surface.n_g, surface.error, offset)
+def aim_from(arrays, surface, spot, n, light, offset):
+    """For Python: a ``SeenLight`` from a ``Surface`` at a ``Spot`` with normal n, the shadow ray by an offset rule, and
+    whether it starts off the surface.
+    """
+    scene = scene_pointers(arrays)
+    seen = see_light(scene.lights, light, surface.p, n, surface.error)
+    start = raised(scene, spot.face, spot.u, spot.v, surface.p, n)
+    if start.is_off:
+        return seen, aim_off(seen, start.point), True
+    return seen, aim(seen, surface.p, surface.n_g, surface.error, offset), False

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import load, pointer
-from renderer.numerics.vec3 import add, barycentric, dot, largest_component, normalized, row3, scale, three
+from renderer.numerics.simd import load, minimum, pointer
+from renderer.numerics.vec3 import add, barycentric, dot, largest_component, normalized, row3, scale, sub, three
 from renderer.shade.records import DIFFUSE, KIND, PHONG, SHININESS, SPECULAR, TRANSMITTANCE
 from renderer.shade.shading import specular
 from renderer.trace.spawn import Facet, facet_of, offset_distance
@@ -31,6 +31,7 @@ class SceneArrays(NamedTuple):
     sky        (4, 3), the unit vector up, and the radiance of zenith, horizon and ground; no rows without a sky
     media      (m,) int64, m <= MAX_MEDIA, the same place for each medium that the eye is in, outermost first
     touching   (F,) uint8, not 0 for faces that may coincide with one that transmits light; no rows if none does
+    soft       whether the terminator of smooth faces is soft
     """
 
     vertices: NDArray[np.float64]
@@ -44,6 +45,7 @@ class SceneArrays(NamedTuple):
     sky: NDArray[np.float64]
     media: NDArray[np.int64]
     touching: NDArray[np.uint8]
+    soft: bool
 
 
 class ScenePointers(NamedTuple):
@@ -67,6 +69,7 @@ class ScenePointers(NamedTuple):
     has_smooth: bool
     has_touching: bool
     has_sky: bool
+    soft: bool
 
 
 @inlined
@@ -89,6 +92,7 @@ def scene_pointers(scene):
         len(scene.smooth) > 0,
         len(scene.touching) > 0,
         len(scene.sky) > 0,
+        scene.soft,
     )
 
 
@@ -115,6 +119,17 @@ class Surface(NamedTuple):
 
 
 @inlined
+def _seen(n_s, n_g, d):
+    """The shading normal n_s, bent across the ray where the smooth surface turns away from it and the flat face n_g
+    does not, as at an outline. Normals of a file may lie on the other side of the face, and stay there.
+    """
+    away = dot(n_s, d)
+    if away * dot(n_g, d) * dot(n_s, n_g) >= 0.0:
+        return n_s
+    return normalized(sub(n_s, scale(d, away * (1.0 + 2.0**-20))))
+
+
+@inlined
 def look_at(scene, face, u, v, d):
     """The ``Look`` at barycentrics u, v of a face hit by a ray of direction d."""
     a, b, c = row3(scene.faces, face)
@@ -126,7 +141,45 @@ def look_at(scene, face, u, v, d):
         # A file may hold zeros, and opposite normals cancel: a surface without a direction would let light through.
         # rule: unit-shading-normal
         n_s = normalized(n) if largest_component(n) > 0.0 else n_s
+        if scene.soft:
+            n_s = _seen(n_s, facet.normal, d)
     return Look(barycentric(p0, p1, p2, u, v), facet, n_s, load(scene.material, face))
+
+
+class Raised(NamedTuple):
+    """A point of a face, or the one above it on the smooth surface that the face stands for, and whether it is off."""
+
+    point: tuple
+    is_off: bool
+
+
+@inlined
+def raised(scene, face, u, v, p, n):
+    """The point p at barycentrics u, v of a smooth face, ``Raised`` on the side of the shading normal n: the mean of
+    its images in the planes across the normals of the corners, where it is below them.
+
+    Shadow rays from there are not hidden by the faces next to it, of which the smooth surface has none.
+    Hanika, Hacking the Shadow Terminator, in Ray Tracing Gems II, 2021.
+    """
+    if not (scene.soft and scene.has_smooth and load(scene.smooth, face)):
+        return Raised(p, False)
+    a, b, c = row3(scene.faces, face)
+    up_a, up_b, up_c = _up_to(scene, a, p, n), _up_to(scene, b, p, n), _up_to(scene, c, p, n)
+    up = barycentric(up_a, up_b, up_c, u, v)
+    return Raised(add(p, up), largest_component(up) > 0.0)
+
+
+@inlined
+def _up_to(scene, vertex, p, n):
+    """The way from p up to the plane through a vertex across its normal, 0 where p is not below it."""
+    normal = row3(scene.normals, vertex)
+    if largest_component(normal) == 0.0:
+        return (0.0, 0.0, 0.0)
+    normal = normalized(normal)
+    outwards = normal if dot(normal, n) > 0.0 else scale(normal, -1.0)
+    # rule: soft-terminator
+    height = minimum(dot(sub(p, row3(scene.vertices, vertex)), outwards), 0.0)
+    return scale(outwards, -height)
 
 
 @inlined

@@ -257,4 +257,5 @@ def render_settings(
         min_weight=scene.render.min_weight,
         max_rays=scene.render.max_rays if last else min(SOON, scene.render.max_rays),
         shadows=settings.shadows and not seen_directly,
+        terminator=scene.render.terminator,
     )

@@ -127,7 +127,10 @@ PICTURES = {
     ),
     "bounces": Check(check_bounces, ("scene.render.max_depth", "scene.render.min_weight", "prepare")),
     "lights": Check(check_shining, ("DirectionalLight", "PointLight")),
-    "skies": Check(check_skies, ("Sky", "scene.sky", "Scene.all_lights", "Mesh.creased", "scene.objects.crease")),
+    "skies": Check(
+        check_skies,
+        ("Sky", "scene.sky", "Scene.all_lights", "Mesh.creased", "scene.objects.crease", "scene.render.terminator"),
+    ),
     "planes of pictures": Check(lambda: check_images(_random()), ("Image", "scene.render.max_rays")),
     "files of pictures": Check(check_saved, ("Image.save",)),
     "nested media": Check(check_nesting, ("Dielectric",)),

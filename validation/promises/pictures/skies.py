@@ -7,9 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
+from renderer.mesh.shapes import icosphere
+from renderer.picture.render import render
 from renderer.scene.camera import OrthographicCamera
+from renderer.scene.light import DirectionalLight
 from renderer.scene.material import Mirror, Phong
-from renderer.scene.scene import Scene
+from renderer.scene.scene import Scene, SceneObject
 from renderer.scene.sky import Sky
 from validation.promises.pictures.glowing import equal, from_above, shown, square, thing
 from validation.promises.row import row
@@ -27,6 +30,7 @@ def check_skies() -> list[dict[str, Any]]:
         row("a mirror shows the sky", "closed form", _mirrored()),
         row("level ground has the light of the whole sky and of the sun's disc", "closed form", _lit()),
         row("smooth normals stop at edges sharper than the crease", "closed form", _creased()),
+        row("with a soft terminator a convex body hides no light from itself", "known answer", _soft()),
     ]
 
 
@@ -84,6 +88,18 @@ def _lit() -> NDArray[np.bool_]:
         )  # fmt: skip
         kept.append(equal(shown(scene, (1, 1)), np.full((1, 1, 3), light)).ravel())
     return np.concatenate(kept)
+
+
+def _soft() -> NDArray[np.bool_]:
+    """A smooth ball of few faces, lit from the side: with shadows and without the picture has the same bits."""
+    camera = OrthographicCamera(eye=(0.0, 0.0, 5.0), target=(0.0, 0.0, 0.0), height=2.0)
+    ball = SceneObject(mesh=icosphere(1), material="white", normals="smooth", rotate=(10.0, 20.0, 30.0))
+    light = DirectionalLight(direction=(-1.0, 0.0, -0.2))
+    scene = Scene(camera=camera, materials={"white": Phong(diffuse=1.0)}, objects=(ball,), lights=(light,))
+    lit, soft = (
+        render(scene, resolution=(40, 40), shadows=shadows, terminator="soft").radiance for shadows in (False, True)
+    )
+    return (lit == soft).all(axis=-1).ravel()
 
 
 def _creased() -> NDArray[np.bool_]:
