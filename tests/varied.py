@@ -84,7 +84,7 @@ OTHERS: dict[type[Fields], Table] = {
                   "scale": [0.5, 0.6, 0.9], "rotate": [40.0, 10.0, 60.0], "translate": [0.3, 0.9, 0.4]},
     Floor: {"min": [-2.5, -1.0], "max": [1.0, 2.5], "materials": ["chalk", "steel"], "squares": [5, 2]},
     RenderSettings: {"resolution": [9, 7], "samples": 9, "max_depth": 0, "min_weight": 0.25, "max_rays": 5,
-                     "shadows": False, "terminator": "soft"},
+                     "shadows": False, "glass_shadows": "clear", "terminator": "soft"},
     Sky: {"zenith": [0.9, 0.1, 0.2], "horizon": [0.1, 0.6, 0.3], "ground": [0.6, 0.1, 0.5], "lights": 5,
           "sun": [0.6, -0.7, 0.1], "sun_irradiance": [0.9, 0.2, 0.6], "sun_angle": 40.0, "sun_lights": 2},
     Scene: {"ambient": [0.7, 0.1, 0.2], "background": [0.8, 0.1, 0.3], "sky": {"lights": 4}, "up": "z"},

@@ -15,6 +15,7 @@ from renderer.errors import expect
 from renderer.numerics.vec3 import add
 from renderer.picture.prepare import PreparedScene
 from renderer.scene.camera import checked_vector
+from renderer.shade.direct import MOST_PANES
 
 # In glass there are up to 2^d rays of depth d: too many to look at, and to wait for after a click. This many are all of
 # them to depth 8, the shadow rays not counted, and take about a tenth of a second.
@@ -100,17 +101,25 @@ def _hit_segments(steps: Steps, ray: Ray, met: SurfaceHit, parent: int, own: int
     radiance, shadow_rays = steps.ambient(ray, met), []
     for aim in steps.aims(ray, met):
         if shadows:
-            shadow_rays.append(_shadow(steps, ray, own, aim))
+            shadow_rays += _shadows(steps, ray, own, aim)
         else:
             radiance = add(radiance, aim.radiance)
     p, face = met.surface.p, int(met.together.seen.face)
     return [Segment(ray.kind, ray.depth, parent, ray.origin, p, True, face, ray.weight, radiance), *shadow_rays]
 
 
-def _shadow(steps: Steps, ray: Ray, own: int, aim: Aim) -> Segment:
-    """The segment of a shadow ray; it ends at the nearest surface that hides the light."""
-    hits = steps.closest(aim.origin, aim.direction, aim.t_max, aim.start)
-    hidden = bool(hits.hit[0])
-    end = color_at(hits.points[0], 0) if hidden else aim.end
-    radiance = (0.0, 0.0, 0.0) if hidden else aim.radiance
-    return Segment("shadow", ray.depth, own, aim.origin, end, hidden, int(hits.face[0]), ray.weight, radiance)
+def _shadows(steps: Steps, ray: Ray, own: int, aim: Aim) -> list[Segment]:
+    """The segments of a shadow ray: one that ends at the nearest surface that hides the light, and one before it for
+    each surface that lets the light through.
+    """
+    found = []
+    while True:
+        hits = steps.closest(aim.origin, aim.direction, aim.t_max, aim.start)
+        hit, face = bool(hits.hit[0]), int(hits.face[0])
+        onwards = steps.pass_through(aim, hits) if hit and len(found) < MOST_PANES else None
+        end = color_at(hits.points[0], 0) if hit else aim.end
+        radiance = (0.0, 0.0, 0.0) if hit else aim.radiance
+        found.append(Segment("shadow", ray.depth, own, aim.origin, end, hit, face, ray.weight, radiance))
+        if onwards is None:
+            return found
+        aim = onwards

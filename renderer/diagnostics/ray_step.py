@@ -9,13 +9,13 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.numerics.vec3 import add, dot, normalized, scale, times
+from renderer.numerics.vec3 import add, dot, normalized, scale, sub, times
 from renderer.picture.pack import media_around
 from renderer.picture.prepare import MediaRule, PreparedScene, arrays_for, media_limit
 from renderer.results.hits import Hits
 from renderer.shade.crossing import SPARE, Change, Together, change_of, place_at, surface_together_of, together_of
 from renderer.shade.lights import aim_from
-from renderer.shade.records import AMBIENT, KIND, LAMBERT, MATERIAL_COLUMNS, PHONG
+from renderer.shade.records import AMBIENT, KIND, LAMBERT, MATERIAL_COLUMNS, PHONG, TRANSMITTANCE
 from renderer.shade.shading import reflect
 from renderer.shade.surface import SceneArrays, Surface, missed_of, phong_of, surface_of
 from renderer.shade.whitted import passes_light_of, refract_from
@@ -141,6 +141,18 @@ class Steps:
             start = _NO_START if is_off else self._start(met.place, met.surface.n_g, way, ray.direction)
             aims.append(Aim(light, o, way, float(t_max), end, radiance, start))
         return aims
+
+    def pass_through(self, aim: Aim, hits: Hits) -> Aim | None:
+        """The rest of a shadow ray beyond the surface that it hit, if light passes there; None if it does not."""
+        spot, d = Spot(int(hits.face[0]), float(hits.u[0]), float(hits.v[0])), aim.direction
+        met = surface_of(self.arrays, *spot, d)
+        through = color_at(self.arrays.materials[int(met.material) // MATERIAL_COLUMNS], TRANSMITTANCE)
+        if not self.arrays.clear or not max(through) > 0.0:
+            return None
+        origin = spawn_origin(met.p, met.error, met.n_g, d, self.offset)
+        onwards = d if aim.t_max == np.inf else sub(add(aim.origin, d), origin)
+        start = self._start(place_at(spot, met, d), met.n_g, onwards, d)
+        return aim._replace(origin=origin, direction=onwards, radiance=times(aim.radiance, through), start=start)
 
     def bounce(self, ray: Ray, met: SurfaceHit) -> list[Ray]:
         """The rays spawned at the surface: the reflected one, then the refracted one if light is transmitted."""

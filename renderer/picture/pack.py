@@ -44,6 +44,7 @@ def pack(scene: Scene, needs: Features | None = None) -> tuple[Mesh, SceneArrays
         media=media_around(scene, scene.camera) if needs.refraction else np.zeros(0, np.int64),
         touching=np.zeros(0, np.uint8),
         soft=scene.render.terminator == "soft",
+        clear=scene.render.glass_shadows == "clear",
     )
     return mesh, arrays
 

@@ -113,7 +113,8 @@ class PreparedScene:
         first_row, end_row = (0, height) if band is None else band
         rows, samples = camera.rows(width, height), sample_offsets(chosen.samples)
         settings = kernel_settings_of(self.needs, chosen, offset, media)
-        arrays = arrays_for(self, camera, offset, media)._replace(soft=chosen.terminator == "soft")
+        arrays = arrays_for(self, camera, offset, media)
+        arrays = arrays._replace(soft=chosen.terminator == "soft", clear=chosen.glass_shadows == "clear")
         across, cut = -(-width // TILE), np.zeros(tiles(width, end_row - first_row), np.int64)
 
         def render_in(film: Film, first: int) -> Iterator[None]:

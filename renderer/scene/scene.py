@@ -89,6 +89,9 @@ class RenderSettings(Fields):
         than full branching makes in ten bounces under three lights.
     shadows : bool, default True
         Whether surfaces hide lights. If not, no shadow rays are traced.
+    glass_shadows : {"opaque", "clear"}, default "opaque"
+        Whether a surface that transmits light hides lights as all others do, or lets them through, each face times its
+        ``transmittance``. Light is not bent, and none is lost to reflection.
     terminator : {"hard", "soft"}, default "hard"
         Where a smooth surface turns away from a light, its flat faces hide the light from one another: dark teeth show.
         "soft" starts shadow rays on the smooth surface above the faces. It also draws no dark dots at outlines. Flat
@@ -116,6 +119,7 @@ class RenderSettings(Fields):
     min_weight: Annotated[float, Field(ge=0.0, lt=1.0, strict=True)] = 0.0
     max_rays: Annotated[int, Field(ge=1, le=UNLIMITED_RAYS, strict=True)] = 16384
     shadows: Annotated[bool, Field(strict=True)] = True
+    glass_shadows: Literal["opaque", "clear"] = "opaque"
     terminator: Literal["hard", "soft"] = "hard"
 
     @stated
@@ -128,6 +132,7 @@ class RenderSettings(Fields):
         min_weight: float = 0.0,
         max_rays: int = 16384,
         shadows: bool = True,
+        glass_shadows: Literal["opaque", "clear"] = "opaque",
         terminator: Literal["hard", "soft"] = "hard",
     ) -> None: ...
 
@@ -149,6 +154,7 @@ class GivenSettings(TypedDict, total=False):
     min_weight: float | None
     max_rays: int | None
     shadows: bool | None
+    glass_shadows: Literal["opaque", "clear"] | None
     terminator: Literal["hard", "soft"] | None
 
 

@@ -69,6 +69,7 @@ fov = {_FOV}
 
 [render]
 samples = 4
+glass_shadows = "clear"
 terminator = "soft"
 
 [[objects]]

@@ -7,13 +7,15 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import load, offset, store
-from renderer.numerics.vec3 import add, put3, row3, three, times
+from renderer.numerics.vec3 import add, put3, row3, sub, three, times
 from renderer.shade.bundle import SIZE
+from renderer.shade.crossing import place_at
 from renderer.shade.lights import aim, aim_off, see_light
-from renderer.shade.records import DIELECTRIC, KIND, MIRROR, UNLIT
-from renderer.shade.surface import bounds_at, phong, raised
+from renderer.shade.records import DIELECTRIC, KIND, MIRROR, TRANSMITTANCE, UNLIT
+from renderer.shade.surface import bounds_at, lets_through, phong, raised, surface_at
 from renderer.trace.rays import RayPointers
-from renderer.trace.spawn import Facet, Place, put_no_start, put_start
+from renderer.trace.spawn import Facet, Place, put_no_start, put_start, spawn_origin
+from renderer.trace.starts.level import Spot
 from renderer.trace.starts.record import ROW, StartPointers
 from renderer.trace.traverse import trace_rays
 
@@ -25,6 +27,8 @@ SURFACE_DOUBLES = 28
 # Columns of the shadow rays: origin, direction and t_max, the unit direction to the light, the light from there, and
 # the row of ``starts.record``.
 _ORIGIN, _DIRECTION, _T_MAX = 0, 3 * SIZE, 6 * SIZE
+# The most faces that light passes on its way to a surface.
+MOST_PANES = 256
 _TOWARDS, _ARRIVING, _START, SHADOW_DOUBLES = 7 * SIZE, 10 * SIZE, 13 * SIZE, (13 + ROW) * SIZE
 
 
@@ -113,18 +117,54 @@ def _add_light(scene, bundle, surface, i, towards, arriving):
 
 
 @inlined
-def _trace_shadows(tree, scene, bundle, lit, aimed, scratch):
-    """Find which of the ``aimed`` shadow rays hit anything, and count all of them in their pixels."""
-    shadows = scratch.shadows
-    starts = StartPointers(offset(shadows, _START), ROW, scene.vertices, scene.faces)
-    rays = RayPointers(
-        offset(shadows, _ORIGIN), offset(shadows, _DIRECTION), scratch.zero, offset(shadows, _T_MAX),
+def _shadow_rays(scene, shadows, zero, k):
+    """The shadow rays from the k-th on."""
+    starts = StartPointers(offset(shadows, _START + ROW * k), ROW, scene.vertices, scene.faces)
+    return RayPointers(
+        offset(shadows, _ORIGIN + 3 * k), offset(shadows, _DIRECTION + 3 * k), zero, offset(shadows, _T_MAX + k),
         3, 3, 0, 1, 1.0, starts,
     )  # fmt: skip
+
+
+@kernel
+def _pass_through(tree, scene, scratch, k, rule):
+    """Follow the k-th shadow ray, which hits something, through all that transmits light: the light that arrives is
+    multiplied by the transmittance of each face. Returns whether an opaque face hides the light, and the number of rays
+    traced beyond the first.
+    """
+    shadows, found = scratch.shadows, scratch.passed
+    row, start, rays = 3 * k, offset(shadows, _START + ROW * k), 0
+    while True:
+        trace_rays(tree, _shadow_rays(scene, shadows, scratch.zero, k), found, 1, scratch.trace, np.bool_(False))
+        if load(found.face, 0) < 0:
+            return False, rays
+        d, t_max = three(shadows, _DIRECTION + row), load(shadows, _T_MAX + k)
+        spot = Spot(load(found.face, 0), load(found.u, 0), load(found.v, 0))
+        met = surface_at(scene, spot.face, spot.u, spot.v, d)
+        # rule: clear-shadows
+        if not lets_through(scene.materials, met.material) or rays == MOST_PANES:
+            return True, rays
+        through = three(scene.materials, met.material + TRANSMITTANCE)
+        put3(shadows, _ARRIVING + row, times(three(shadows, _ARRIVING + row), through))
+        o = spawn_origin(met.p, met.error, met.n_g, d, rule)
+        onwards = d if t_max == np.inf else sub(add(three(shadows, _ORIGIN + row), d), o)
+        put_start(start, place_at(spot, met, d), met.n_g, onwards, d, rule)
+        put3(shadows, _ORIGIN + row, o)
+        put3(shadows, _DIRECTION + row, onwards)
+        rays += 1
+
+
+@inlined
+def _trace_shadows(tree, scene, bundle, lit, aimed, rule, scratch):
+    """Find which of the ``aimed`` shadow rays hit anything, and count all of them in their pixels."""
+    rays = _shadow_rays(scene, scratch.shadows, scratch.zero, 0)
     trace_rays(tree, rays, scratch.found, aimed, scratch.trace, np.bool_(True))
     for k in range(aimed):
-        pixel = load(bundle.pixels, load(lit, SIZE + k))
-        store(scratch.traced, pixel, load(scratch.traced, pixel) + 1)
+        pixel, more = load(bundle.pixels, load(lit, SIZE + k)), 0
+        if scene.clear and load(scratch.found.hit, k):
+            hidden, more = _pass_through(tree, scene, scratch, k, rule)
+            store(scratch.found.hit, k, hidden)
+        store(scratch.traced, pixel, load(scratch.traced, pixel) + 1 + more)
 
 
 @kernel
@@ -139,7 +179,7 @@ def light_surfaces(tree, scene, bundle, surfaces, lit, settings, scratch):
     for light in range(scene.light_count):
         aimed = _aim_all(scene, bundle, surfaces, lit, count, light, settings.offset, shadows)
         if settings.shadows:
-            _trace_shadows(tree, scene, bundle, lit, aimed, scratch)
+            _trace_shadows(tree, scene, bundle, lit, aimed, settings.offset, scratch)
         for k in range(aimed):
             i = load(lit, SIZE + k)
             # rule: shadows

@@ -32,6 +32,7 @@ class SceneArrays(NamedTuple):
     media      (m,) int64, m <= MAX_MEDIA, the same place for each medium that the eye is in, outermost first
     touching   (F,) uint8, not 0 for faces that may coincide with one that transmits light; no rows if none does
     soft       whether the terminator of smooth faces is soft
+    clear      whether light passes surfaces that transmit light
     """
 
     vertices: NDArray[np.float64]
@@ -46,6 +47,7 @@ class SceneArrays(NamedTuple):
     media: NDArray[np.int64]
     touching: NDArray[np.uint8]
     soft: bool
+    clear: bool
 
 
 class ScenePointers(NamedTuple):
@@ -70,6 +72,7 @@ class ScenePointers(NamedTuple):
     has_touching: bool
     has_sky: bool
     soft: bool
+    clear: bool
 
 
 @inlined
@@ -93,6 +96,7 @@ def scene_pointers(scene):
         len(scene.touching) > 0,
         len(scene.sky) > 0,
         scene.soft,
+        scene.clear,
     )
 
 

@@ -88,7 +88,8 @@ class BundleScratch(NamedTuple):
 
     The bundles and the order of their places: waiting ones first, then free ones. For tracing: scratch, hits, and a
     zero and an infinity as bounds. For the current bundle: surfaces, shadow rays, the list of lit rays, and the media
-    beyond the surfaces. For each pixel: colour, number of rays traced, and whether ``Settings.max_rays`` cut it.
+    beyond the surfaces; the hit of one shadow ray. For each pixel: colour, number of rays traced, and whether
+    ``Settings.max_rays`` cut it.
     """
 
     bundles: Any
@@ -102,6 +103,7 @@ class BundleScratch(NamedTuple):
     shadows: Any
     lit: Any
     beyond: Any
+    passed: HitPointers
     color: Any
     traced: Any
     cut: Any
@@ -113,9 +115,9 @@ def scratch_lengths(settings: Settings) -> tuple[int, int]:
     At most one bundle waits on each level; one more is current, and two places are free for those that it spawns.
     """
     slots = settings.max_depth + 4
-    doubles = slots * BUNDLE_DOUBLES + 3 * SIZE + 2 + SIZE * SURFACE_DOUBLES + SHADOW_DOUBLES + 3 * SIZE
+    doubles = slots * BUNDLE_DOUBLES + 3 * SIZE + 2 + SIZE * SURFACE_DOUBLES + SHADOW_DOUBLES + 3 * SIZE + 3
     beyond = SIZE * (settings.media + SPARE)
-    integers = slots * (BUNDLE_INTEGERS + SIZE * settings.media + 1) + SIZE + 1 + 2 * SIZE + beyond + 3 * SIZE
+    integers = slots * (BUNDLE_INTEGERS + SIZE * settings.media + 1) + SIZE + 1 + 2 * SIZE + beyond + 3 * SIZE + 2
     return doubles, integers
 
 
@@ -137,9 +139,13 @@ def bundle_scratch(doubles, integers, hits, settings, trace):
     traced = offset(beyond, SIZE * (settings.media + SPARE))
     side = offset(traced, 2 * SIZE)
     found = HitPointers(t, face, u, v, side, side, hits)
+    color = offset(shadows, SHADOW_DOUBLES)
+    one, its_face = offset(color, 3 * SIZE), offset(side, SIZE)
+    its_side = offset(its_face, 1)
+    passed = HitPointers(one, its_face, offset(one, 1), offset(one, 2), its_side, its_side, hits)
     return BundleScratch(
-        doubles, integers, order, trace, found, zero, infinity, surfaces, shadows, lit, beyond,
-        offset(shadows, SHADOW_DOUBLES), traced, offset(traced, SIZE),
+        doubles, integers, order, trace, found, zero, infinity, surfaces, shadows, lit, beyond, passed, color, traced,
+        offset(traced, SIZE),
     )  # fmt: skip
 
 

@@ -257,5 +257,6 @@ def render_settings(
         min_weight=scene.render.min_weight,
         max_rays=scene.render.max_rays if last else min(SOON, scene.render.max_rays),
         shadows=settings.shadows and not seen_directly,
+        glass_shadows=scene.render.glass_shadows,
         terminator=scene.render.terminator,
     )

@@ -43,7 +43,7 @@ pytestmark = [pytest.mark.filterwarnings("ignore::renderer.SceneWarning"), pytes
     "scene.objects.mesh", "scene.objects.normals", "scene.objects.rotate", "scene.objects.scale",
     "scene.objects.translate", "scene.render", "scene.render.max_depth", "scene.render.max_rays",
     "scene.render.min_weight", "scene.render.resolution", "scene.render.samples", "scene.render.shadows",
-    "scene.render.terminator",
+    "scene.render.glass_shadows", "scene.render.terminator",
     "scene.sky", "scene.sky.ground", "scene.sky.horizon", "scene.sky.lights", "scene.sky.sun", "scene.sky.sun_angle",
     "scene.sky.sun_irradiance", "scene.sky.sun_lights", "scene.sky.zenith", "scene.objects.crease", "scene.up",
 )]  # fmt: skip
@@ -171,6 +171,7 @@ FIELDS: dict[type, dict[str, Field]] = {
         "min_weight": number(0.0, 0.0, math.nextafter(1, 0), refused=(-TINY, 1.0, BEYOND)),
         "max_rays": Field(16384, same(1, 2**62 - 1), [0, -1, 2**62, 1.5, True, "3", None]),
         "shadows": Field(True, same(True, False), [0, 1, "yes", None]),
+        "glass_shadows": Field("opaque", same("opaque", "clear"), ["Clear", "", None, True]),
         "terminator": Field("hard", same("hard", "soft"), ["Hard", "", None, True]),
     },
     Sky: {

@@ -126,7 +126,7 @@ PICTURES = {
         check_floors, ("Floor", "scene.floor.materials", "scene.floor.squares", "scene.render.samples")
     ),
     "bounces": Check(check_bounces, ("scene.render.max_depth", "scene.render.min_weight", "prepare")),
-    "lights": Check(check_shining, ("DirectionalLight", "PointLight")),
+    "lights": Check(check_shining, ("DirectionalLight", "PointLight", "scene.render.glass_shadows")),
     "skies": Check(
         check_skies,
         ("Sky", "scene.sky", "Scene.all_lights", "Mesh.creased", "scene.objects.crease", "scene.render.terminator"),

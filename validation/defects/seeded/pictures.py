@@ -233,6 +233,7 @@ _CHANGES: dict[str, Change] = {
     "where bodies touch a ray comes from air": Rule("medium-of-crossing", element(2, "1.0")),
     "the sky upside down": Rule("sky-gradient", value("-_")),
     "a light of the sky missing": after("Sky.directional", lambda lights: lights[:-1]),
+    "light passes what is opaque": Rule("clear-shadows", value("False")),
     "a soft terminator is hard": Rule("soft-terminator", value("0.0 * _")),
     "no edge is too sharp to be smooth": Rule("sharp-edge", value("_ | True")),
     "edges count as the inside of their faces": Rule("slack-on-edges", choice(test="True")),

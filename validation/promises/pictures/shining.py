@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.picture.render import render
 from renderer.scene.light import DirectionalLight, PointLight
-from renderer.scene.material import Phong
+from renderer.scene.material import Dielectric, Phong
 from renderer.scene.scene import RenderSettings, Scene, SceneObject
 from validation.promises.pictures.glowing import equal, from_above, shown, square, thing
 from validation.promises.row import row
@@ -43,7 +43,34 @@ def check_shining() -> list[dict[str, Any]]:
             _endless(ground),
         ),
         row("what a lamp stands on does not hide it", "known answer", _lamps(ground)),
+        row("light passes glass by its transmittance, and nothing opaque", "closed form", _through(ground)),
     ]
+
+
+def _through(ground: Mesh) -> NDArray[np.bool_]:
+    """Up to three panes, each a square, between the ground and its light; and an opaque one among them or above."""
+    tint, kept = np.array([0.5, 1.0, 0.25]), []
+    pane = square(np.array([-4.0, 0.0, -4.0]), np.array([0.0, 0.0, 8.0]), np.array([8.0, 0.0, 0.0]))
+    for light in (
+        DirectionalLight(direction=(0.25, -1.0, 0.5), irradiance=0.5),
+        PointLight(position=(0.0, 8.0, 0.0), intensity=32.0),
+    ):
+        bare = None
+        for layers in ((), ("glass",), ("glass",) * 3, ("white",), ("glass", "white"), ("white", "glass")):
+            panes = [
+                thing(Mesh(pane.vertices + [0.0, 2.0 + k, 0.0], pane.faces), name) for k, name in enumerate(layers)
+            ]
+            scene = Scene(
+                camera=from_above((0.0, 1.0, 0.0), 1e-6),
+                materials={"white": Phong(diffuse=1.0), "glass": Dielectric(transmittance=tint)},
+                objects=(thing(ground, "white"), *panes), lights=(light,),
+                render=RenderSettings(max_depth=0, glass_shadows="clear"),
+            )  # fmt: skip
+            found = shown(scene, (1, 1))
+            bare = found if bare is None else bare
+            share = 0.0 if "white" in layers else tint ** len(layers)
+            kept.append(equal(found, bare * share).ravel())
+    return np.concatenate(kept)
 
 
 def _narrow(ground: Mesh) -> NDArray[np.bool_]:
