@@ -44,7 +44,7 @@ class RayLists:
             light = scene.lights[0]
             assert isinstance(light, PointLight)
             self._light, self._intensity = mi.Point3f(*light.position), mi.Color3f(*light.intensity)
-            self._background = mi.Color3f(*scene.background)
+            self._sky = _sky(scene)
             dr.eval(self._o, self._d)
 
     def _tables(self, scene: Scene, shapes: dict[Any, int]) -> None:
@@ -86,6 +86,12 @@ class RayLists:
         picture: NDArray[np.float32] = np.stack([channel.numpy() for channel in film], axis=-1)
         return picture
 
+    def _missed(self, d: Any) -> Any:
+        """The radiance of rays that hit nothing."""
+        up, zenith, horizon, ground = (self._mi.Color3f(*row) for row in self._sky)
+        sine = up[0] * d[0] + up[1] * d[1] + up[2] * d[2]
+        return dr.select(sine > 0.0, horizon + sine * (zenith - horizon), ground)
+
     def _gathered(self, pixel: Any, wanted: Any, o: Any, d: Any, weight: Any) -> tuple[Any, ...]:
         """The rays where ``wanted``, gathered without gaps."""
         rows = dr.compress(wanted)
@@ -101,7 +107,7 @@ class RayLists:
         kind = dr.gather(self._mi.UInt32, self._kind, shape, hit)
         color = dr.gather(self._mi.Color3f, self._color, shape, hit)
         direct, lit = self._direct(si, color, hit & (kind == _DIFFUSE))
-        seen = weight * dr.select(hit, direct, self._background)
+        seen = weight * dr.select(hit, direct, self._missed(d))
         for channel, value in zip(film, seen, strict=True):
             dr.scatter_add(channel, value, pixel)
         if not more:
@@ -134,6 +140,14 @@ def _joined(first: Any, second: Any) -> Any:
     return type(first)(*(dr.concat(both) for both in zip(first, second, strict=True)))
 
 
+def _sky(scene: Scene) -> list[Any]:
+    """The vector up, and the radiance of zenith, horizon and ground."""
+    if scene.sky is None:
+        return [(0.0, 1.0, 0.0), scene.background, scene.background, scene.background]
+    ground = scene.sky.horizon if scene.sky.ground is None else scene.sky.ground
+    return [np.eye(3)["xyz".index(scene.up)].tolist(), scene.sky.zenith, scene.sky.horizon, ground]
+
+
 def _check(scene: Scene) -> None:
     used = [scene.materials[instance.material] for instance in scene.instances]
     plain = all(
@@ -143,5 +157,5 @@ def _check(scene: Scene) -> None:
         for m in used
     )
     one_light = len(scene.lights) == 1 and isinstance(scene.lights[0], PointLight)
-    if not plain or not one_light or any(scene.ambient) or scene.sky is not None:
+    if not plain or not one_light or any(scene.ambient) or (scene.sky is not None and scene.sky.lights):
         raise ValueError("scene: expected diffuse, mirror and clear glass under one point light, got more")

@@ -57,9 +57,8 @@ def _through(ground: Mesh) -> NDArray[np.bool_]:
     ):
         bare = None
         for layers in ((), ("glass",), ("glass",) * 3, ("white",), ("glass", "white"), ("white", "glass")):
-            panes = [
-                thing(Mesh(pane.vertices + [0.0, 2.0 + k, 0.0], pane.faces), name) for k, name in enumerate(layers)
-            ]
+            heights = [np.add(pane.vertices, (0.0, 2.0 + k, 0.0)) for k in range(len(layers))]
+            panes = [thing(Mesh(at, pane.faces), name) for at, name in zip(heights, layers, strict=True)]
             scene = Scene(
                 camera=from_above((0.0, 1.0, 0.0), 1e-6),
                 materials={"white": Phong(diffuse=1.0), "glass": Dielectric(transmittance=tint)},
