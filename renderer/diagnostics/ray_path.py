@@ -112,7 +112,7 @@ def _shadows(steps: Steps, ray: Ray, own: int, aim: Aim) -> list[Segment]:
     """The segments of a shadow ray: one that ends at the nearest surface that hides the light, and one before it for
     each surface that lets the light through.
     """
-    found = []
+    found: list[Segment] = []
     while True:
         hits = steps.closest(aim.origin, aim.direction, aim.t_max, aim.start)
         hit, face = bool(hits.hit[0]), int(hits.face[0])
