@@ -17,6 +17,7 @@ def test_the_page_saves_a_still(viewer: Viewer, scenes: Path, tmp_path: Path) ->
     shared(viewer)
     before = viewer.pixels("picture")
     viewer.page.select_option("#still-size", "1920x1080")
+    viewer.page.evaluate("() => (viewer.panel.fields.refine.value = '16')")  # as if the view had rested
     with viewer.page.expect_download() as download:
         viewer.page.click("#export-still")
         viewer.page.wait_for_selector("#exporting:not([hidden])")

@@ -300,13 +300,13 @@ def test_the_address_has_the_mode_and_what_a_proof_compares(viewer: Viewer) -> N
     told(viewer)
     viewer.page.evaluate("() => viewer.setMode('proof')")
     assert told(viewer)["mode"] == ["proof"] and "pair" not in told(viewer)
-    viewer.page.select_option("[name=pair]", "samples")
-    link = address(viewer)
-    assert parse_qs(link.split("#")[1])["pair"] == ["samples"]
     viewer.page.select_option("[name=pair]", "brute")
+    link = address(viewer)
+    assert parse_qs(link.split("#")[1])["pair"] == ["brute"]
+    viewer.page.select_option("[name=pair]", "samples")
     address(viewer)
     viewer.page.evaluate("(hash) => (location.hash = hash)", link.split("#")[1])
-    viewer.page.wait_for_function("() => viewer.panel.settings.pair === 'samples'")
+    viewer.page.wait_for_function("() => viewer.panel.settings.pair === 'brute'")
     viewer.page.evaluate("() => viewer.setMode('octree')")
     settled(viewer)
 
