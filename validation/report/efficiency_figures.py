@@ -23,8 +23,8 @@ def _hits_figure(hits: Mapping[str, Any]) -> dict[str, str]:
     leaks = {p["name"]: (p["leaks"] or 0.5) / p["leak_rays"] for p in points}
     errors = {p["name"]: p["errors"]["p99"] for p in points}
     panels = [
-        Panel(_contenders(points, errors, hits["fronts"]["p99"]), "p99 relative error of t"),
-        Panel(_contenders(points, leaks, hits["fronts"]["leaks"]), "share that leaks"),
+        Panel(contenders(points, errors, hits["fronts"]["p99"]), "p99 relative error of t"),
+        Panel(contenders(points, leaks, hits["fronts"]["leaks"]), "share that leaks"),
     ]
     title = (
         f"Camera rays at the {hits['mesh']['name']} of {hits['mesh']['faces']:,} faces: speed against the 99th "
@@ -36,7 +36,7 @@ def _hits_figure(hits: Mapping[str, Any]) -> dict[str, str]:
     return {"title": title, "svg": shown}
 
 
-def _contenders(
+def contenders(
     points: Sequence[Mapping[str, Any]], errors: Mapping[str, float | None], names: Sequence[str]
 ) -> list[Series]:
     """A marker for each contender, and the front as a line through its markers."""

@@ -17,9 +17,11 @@ def stability_figures(record: Mapping[str, Any]) -> list[dict[str, str]]:
 def _error_figure(name: str, sweep: Mapping[str, Any]) -> dict[str, str]:
     points = sweep["points"]
     x = [p["x"] for p in points]
-    errors = [Series(shown, x, [p[kernel]["relative_max"] for p in points]) for kernel, shown in _NAMES.items()]
     wrong = [Series(shown, x, [p[kernel]["wrong_share"] for p in points]) for kernel, shown in _NAMES.items()]
-    panels = [Panel(errors, "largest relative error of t", roundoffs=True), Panel(wrong, "wrong", share=True)]
+    panels = [
+        Panel(error_series(points), "largest relative error of t", roundoffs=True),
+        Panel(wrong, "wrong", share=True),
+    ]
     title = (
         f"Error against {name}: the largest of {points[0]['rays']} rays at each point, and the share of wrong answers "
         f"(missed, falsely hit, or another face). An error of 0 is drawn at {FLOOR:.0e}."
@@ -28,16 +30,29 @@ def _error_figure(name: str, sweep: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _leak_figure(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
-    x = [row["faces"] for row in rows]
-    # No leak is drawn as half a ray, the resolution of this many rays.
-    floor = 0.5e6 / max(row["rays"] for row in rows)
-    series = [Series(s, x, [1e6 * row[k] / row["rays"] or floor for row in rows]) for k, s in _NAMES.items()]
     title = (
         f"Leaks from inside icospheres, {rows[0]['rays']:,} rays a mesh, half at edges and half at vertices. No leak "
-        f"is drawn at {floor:.3g} a million, half a ray."
+        f"is drawn at {_half_a_ray(rows):.3g} a million, half a ray."
     )
-    svg = loglog(series, x_label="faces", y_label="leaks per million rays", title="Leaks against mesh size")
+    svg = loglog(leak_series(rows), x_label="faces", y_label="leaks per million rays", title="Leaks against mesh size")
     return {"title": title, "svg": svg}
+
+
+def error_series(points: Sequence[Mapping[str, Any]]) -> list[Series]:
+    """The largest relative error of t of each contender."""
+    x = [p["x"] for p in points]
+    return [Series(shown, x, [p[kernel]["relative_max"] for p in points]) for kernel, shown in _NAMES.items()]
+
+
+def leak_series(rows: Sequence[Mapping[str, Any]]) -> list[Series]:
+    """Each contender's leaks per million rays by the mesh's faces."""
+    x, floor = [row["faces"] for row in rows], _half_a_ray(rows)
+    return [Series(s, x, [1e6 * row[k] / row["rays"] or floor for row in rows]) for k, s in _NAMES.items()]
+
+
+def _half_a_ray(rows: Sequence[Mapping[str, Any]]) -> float:
+    """What stands for no leak: half the resolution of this many rays, per million."""
+    return 0.5e6 / max(row["rays"] for row in rows)
 
 
 def studies_figures(record: Mapping[str, Any]) -> list[dict[str, str]]:

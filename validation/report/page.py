@@ -8,13 +8,14 @@ from typing import Any, NamedTuple
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from validation.report import efficiency_figures, figures
+from validation.report import efficiency_figures, figures, headline
 
 _TEMPLATES = Path(__file__).parent / "templates"
 
 # Functions for templates that draw curves from a record: figures with a title and an SVG, or the SVG alone.
 FIGURES: dict[str, Callable[..., Any]] = {
     "stability_figures": figures.stability_figures,
+    "headline_figures": headline.figures,
     "efficiency_figures": efficiency_figures.figures,
     "monte_carlo_figure": figures.monte_carlo_figure,
     "studies_figures": figures.studies_figures,
@@ -31,14 +32,14 @@ class Partial(NamedTuple):
 
 # The sections in the page's order.
 PARTIALS = {
-    "images": Partial("Pictures", "beside Mitsuba's, one effect of light at a time", "pictures.html"),
     "hits": Partial("Hits", "beside Embree, libigl, Mitsuba and trimesh, judged by exact arithmetic", "hits.html"),
+    "images": Partial("Pictures", "beside Mitsuba's, one effect of light at a time", "pictures.html"),
     "queries": Partial("Queries", "inside, distance, all hits, and the drop-in for trimesh", "queries.html"),
     "studies": Partial("Studies", "sky view factors, hours of sun, ambient occlusion", "studies.html"),
     "stability": Partial("Stability", "extreme cases, watertightness, error of the hit distance", "stability.html"),
     "random": Partial("Random input", "scenes and meshes drawn from a seed", "random.html"),
-    "efficiency": Partial("Efficiency", "error and run time beside other tracers; no gates", "efficiency.html"),
     "promises": Partial("Promises", "rules of the documentation, each checked on its own", "promises.html"),
+    "efficiency": Partial("Efficiency", "error and run time beside other tracers; no gates", "efficiency.html"),
 }
 
 

@@ -34,6 +34,8 @@ _SVG = "http://www.w3.org/2000/svg"
 _HREF = "{http://www.w3.org/1999/xlink}href"
 _FONT = "DejaVu Sans"  # comes with matplotlib; text is laid out with it and shown in the page's own sans-serif
 _PIXELS = 100.0  # an inch
+_LEGEND = 8.0  # points
+_TWO_ROWS = 45.0  # pixels
 
 
 class Series(NamedTuple):
@@ -71,8 +73,10 @@ def loglog(series: Sequence[Series], *, x_label: str, y_label: str, title: str) 
     return draw([Panel(series, y_label)], x_label=x_label, title=title)
 
 
-def draw(panels: Sequence[Panel], *, x_label: str, title: str) -> str:
-    """Panels below each other, the first one the largest, with one x axis and one legend; see ``loglog``."""
+def draw(panels: Sequence[Panel], *, x_label: str, title: str, width: int = 600) -> str:
+    """Panels below each other, the first one the largest, with one x axis and one legend, ``width`` pixels wide; see
+    ``loglog``.
+    """
     bad = [x for panel in panels for s in panel.series for x in s.x if not 0.0 < x < math.inf]
     if bad:
         raise ValueError(f"series: expected positive, finite x for {title!r}, got {bad[0]}")
@@ -85,7 +89,7 @@ def draw(panels: Sequence[Panel], *, x_label: str, title: str) -> str:
     }  # fmt: skip
     with matplotlib.rc_context(settings):
         height = 360.0 + 150.0 * (len(panels) - 1)
-        figure = Figure(figsize=(600 / _PIXELS, height / _PIXELS), dpi=_PIXELS, layout="constrained")
+        figure = Figure(figsize=(width / _PIXELS, height / _PIXELS), dpi=_PIXELS, layout="constrained")
         figure.patch.set_visible(False)
         ratios = [2.4] + [1.0] * (len(panels) - 1)
         rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
@@ -107,11 +111,14 @@ def _add_legend(figure: Figure, handles: Mapping[str, Any]) -> None:
     renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
     for columns in range(len(handles) if len(handles) <= 4 else 3, 0, -1):
         legend = figure.legend(
-            handles.values(), handles.keys(), loc="outside upper center", ncols=columns, frameon=False
+            handles.values(), handles.keys(), loc="outside upper center", ncols=columns, frameon=False, fontsize=_LEGEND
         )
         if columns == 1 or legend.get_window_extent(renderer).width <= figure.bbox.width:
-            return
+            break
         legend.remove()
+    # The axes keep their height beside a legend of many rows.
+    more = max(0.0, legend.get_window_extent(renderer).height - _TWO_ROWS)
+    figure.set_figheight(figure.get_figheight() + more / _PIXELS)
 
 
 def _plot(panel: Panel, axes: Axes) -> None:

@@ -74,7 +74,18 @@ def test_the_verdict_comes_first_and_names_what_fails(metrics: dict[str, Any], t
     assert page.index("<details") > page.index('id="sections"')
     # The section that fails is open, and no other.
     assert page.count('" open>') == 1 and 'id="section-images" open>' in page
-    order = [page.index(f'id="{name}"') for name in ("section-images", "references", "defects", "versions")]
+    names = (
+        "verdict",
+        "sections",
+        "section-images",
+        "checks",
+        "defects",
+        "appendix",
+        "gates",
+        "references",
+        "versions",
+    )
+    order = [page.index(f'id="{name}"') for name in names]
     assert order == sorted(order)
     assert "Mitsuba &lt;3&gt;" in page and "not named by --only" in page and "There is none." in page
 
