@@ -643,7 +643,7 @@ class Viewer {
     const [frame, card] = ["#frame", "#card"].map((name) => find(name).getBoundingClientRect());
     const [left, right] = [Math.max(card.left, frame.left), Math.min(card.right, frame.right)];
     const over = card.top < frame.bottom && card.bottom > frame.top ? Math.max(right - left, 0) : 0;
-    const hidden = over && over + 2 * Math.min(left - frame.left, frame.right - right); // with the gap at its side
+    const hidden = over && over + Math.min(left - frame.left, frame.right - right); // with the gap at its side
     const side = left - frame.left < frame.right - right ? 1 : -1;
     return { x: (side * hidden) / 2 / frame.height, width: (frame.width - hidden) / frame.height };
   }
