@@ -452,39 +452,41 @@ def test_the_sun_turns_about_the_axis_that_is_up(browser: Any, tmp_path: Path) -
         np.testing.assert_allclose(found, light.direction, atol=1e-12)
 
 
-def test_each_change_is_undone_and_done_again(viewer: Viewer) -> None:
+def test_each_change_is_undone_and_done_again(browser: Any, url: str) -> None:
     """A drag is one step, an edit another; the browser's Back is Undo, and the first view is the end of it."""
-    told(viewer)
-    assert viewer.page.is_disabled("#undo")
-    first = viewer.camera
-    viewer.drag(60, 10)
-    settled(viewer)
-    told(viewer)
-    turned = viewer.camera
-    unfold(viewer, RED)
-    green = viewer.page.locator(f"{RED} [aria-label='diffuse, green']")
-    green.fill("0.5")
-    settled(viewer)
-    told(viewer)
-    viewer.page.locator("#stage").press("Control+z")
-    viewer.page.wait_for_function("() => !viewer.panel.settings.edits")
-    settled(viewer)
-    assert (
-        viewer.camera == turned and viewer.page.locator(f"{RED} [aria-label='diffuse, green']").input_value() == "0.1"
-    )
-    viewer.page.go_back()
-    viewer.page.wait_for_function(
-        "(m) => String(viewer.camera.matrix()) === m", arg=viewer.page.evaluate("(m) => String(m)", first["m"])
-    )
-    settled(viewer)
-    assert told(viewer) is not None and viewer.page.is_disabled("#undo")
-    viewer.page.locator("#stage").press("Control+z")  # nothing before: the page stays
-    for _ in range(2):
-        viewer.page.click("#redo")
-        viewer.page.wait_for_timeout(300)
-    viewer.page.wait_for_function("() => viewer.panel.settings.edits?.materials.red.diffuse[1] === 0.5")
-    settled(viewer)
-    assert viewer.camera == turned
+    with Viewer(browser, url) as page:
+        page.open()
+        told(page)
+        assert page.page.is_disabled("#undo")
+        first = page.camera
+        page.drag(60, 10)
+        settled(page)
+        told(page)
+        turned = page.camera
+        unfold(page, RED)
+        green = page.page.locator(f"{RED} [aria-label='diffuse, green']")
+        green.fill("0.5")
+        settled(page)
+        told(page)
+        page.page.locator("#stage").press("Control+z")
+        page.page.wait_for_function("() => !viewer.panel.settings.edits")
+        settled(page)
+        assert (
+            page.camera == turned and page.page.locator(f"{RED} [aria-label='diffuse, green']").input_value() == "0.1"
+        )
+        page.page.go_back()
+        page.page.wait_for_function(
+            "(m) => String(viewer.camera.matrix()) === m", arg=page.page.evaluate("(m) => String(m)", first["m"])
+        )
+        settled(page)
+        assert told(page) is not None and page.page.is_disabled("#undo")
+        page.page.locator("#stage").press("Control+z")  # nothing before: the page stays
+        for _ in range(2):
+            page.page.click("#redo")
+            page.page.wait_for_timeout(300)
+        page.page.wait_for_function("() => viewer.panel.settings.edits?.materials.red.diffuse[1] === 0.5")
+        settled(page)
+        assert page.camera == turned
 
 
 FAULTS = [
