@@ -738,15 +738,6 @@ def face_normals(corners: Float64Array) -> Float64Array:
     return normals
 
 
-def build_mesh(repairs: list[Repairs] | None, vertices: Any, faces: Any, **attributes: Any) -> Mesh:
-    """``Mesh(...)``, or, where a list of repairs is given, ``Mesh.repaired(...)`` with its ``Repairs`` added there."""
-    if repairs is None:
-        return Mesh(vertices, faces, **attributes)
-    mesh, made = Mesh.repaired(vertices, faces, **attributes)
-    repairs.append(made)
-    return mesh
-
-
 _VERTEX_ATTRIBUTES: tuple[tuple[str, int, type[np.floating]], ...] = (
     ("normals", 3, np.float64),
     ("colors", 3, np.float32),
