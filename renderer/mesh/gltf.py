@@ -56,7 +56,8 @@ def parse_gltf(content: bytes, reading: Reading | None = None, folder: Path | No
     try:
         _refuse_unread(document)
         accessors = Accessors(document, _buffers(document, binary, folder))
-        return _mesh(document, accessors, reading)
+        with np.errstate(over="ignore", invalid="ignore"):  # what float64 cannot hold is rejected or repaired
+            return _mesh(document, accessors, reading)
     except MeshError:
         raise
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError) as error:
@@ -76,6 +77,8 @@ def _document(content: bytes) -> tuple[dict[str, Any], bytes | None]:
             raise MeshError(f"truncated: expected {length} bytes, got {len(content)}")
         chunks = dict(reversed(list(_chunks(content, length))))  # the first of a kind counts
         text, binary = chunks.get(_JSON, b""), chunks.get(_BINARY)
+    if text is content and content.lstrip()[:1] != b"{":
+        raise MeshError(f"expected a first word 'glTF', got {content[:4]!r}")
     try:
         document = json.loads(text.decode("utf-8"))
     except (ValueError, RecursionError) as error:

@@ -66,7 +66,8 @@ def load_mesh(
     Notes
     -----
     Polygons are cut by a fan from the first corner if that covers them, else by mapbox_earcut, also those that touch
-    themselves or have a hole by a bridge. Those that cross themselves or are far from flat keep the fan, with a warning.
+    themselves or have a hole by a bridge. Those that cross themselves or are far from flat keep the fan, and are
+    named by the warning.
 
     Examples
     --------

@@ -69,8 +69,8 @@ def parse_ply(content: bytes, reading: Reading | None = None) -> Mesh:
 
     Faces come from the elements ``face`` (polygons are cut as ``polygons.triangulate`` says) and ``tristrips``
     (-1 restarts a strip; every second triangle is turned; stitching triangles without area stay), in the file's
-    order. Vertex normals, colours (red, green, blue; unsigned integers are
-    divided by their type's maximum, signed ones by 255) and texture coordinates (s t, u v or texture_u texture_v) are
+    order. Vertex normals, colours (red, green, blue; integers are
+    divided by 255 or by their type's maximum) and texture coordinates (s t, u v or texture_u texture_v) are
     kept. Other properties and elements are left out and noted, as are faces of fewer than three corners, header lines
     of no meaning and bytes behind the last element.
 
@@ -350,15 +350,21 @@ def _colors(vertex: _Columns, reading: Reading) -> Float64Array | None:
     colors = _vertex_columns(vertex, names)
     if colors is None:
         return None
-    types = [vertex[name].property.type for name in names]
-    # Signed ones are those of bytes, as are unsigned ones of more than two: nobody writes 32 bits a channel.
-    scale = np.array([{"f": 1, "u": 255 if t.itemsize > 2 else np.iinfo(t).max}.get(t.kind, 255) for t in types])
-    with np.errstate(invalid="ignore"):
-        unfit = [t.kind != "f" for t in types] & ~((colors >= 0) & (colors <= scale)).all(axis=0)
-    if unfit.any() or not np.isfinite(colors).all():
+    scale = np.array([_full(vertex[name].property.type, column) for name, column in zip(names, colors.T, strict=True)])
+    with np.errstate(invalid="ignore"):  # NaN, which does not fit either
+        fit = np.isfinite(colors) & ((scale == 1.0) | ((colors >= 0.0) & (colors <= scale)))
+    if not fit.all():
         reading.note("left out: vertex colours that do not fit their type or 0 to 255")
         return None
     return colors / scale
+
+
+def _full(type_: np.dtype[Any], values: Float64Array) -> float:
+    """What stands for 1: 255 for signed integers, and for unsigned ones of 32 bits and more where none is larger."""
+    if type_.kind == "f":
+        return 1.0
+    few = type_.kind == "i" or (type_.itemsize > 2 and values.max(initial=0.0) <= 255.0)
+    return 255.0 if few else float(np.iinfo(type_).max)
 
 
 def _corners(element: str, columns: _Columns) -> _Column:

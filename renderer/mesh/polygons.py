@@ -1,7 +1,7 @@
 """Cutting polygons into triangles.
 
 A fan from the first corner is right for convex polygons and for every other one that the first corner sees
-whole; nearly all polygons in files are like that, and keep their fan. The rest are cut by mapbox_earcut, which also cuts
+whole; nearly all polygons in files are like that, and keep their fan. The rest are cut by mapbox_earcut, also
 polygons that touch themselves, such as those with a hole by a bridge. A cut counts if it is proven right: triangles
 that are all wound as the polygon and have its area cover it once.
 """
@@ -48,7 +48,7 @@ def triangulate(positions: _Floats, corners: _Ints, starts: _Ints) -> Cut:
 
     Polygon a b c d ... becomes abc, acd, ... where those triangles do not overlap, else others that do not overlap and
     are wound as the polygon is. The fan stays for polygons that have no area, and, as ``wrong`` ones, for those that
-    cross themselves or stray from a plane.
+    cross themselves or stray from a plane. What a polygon winds around twice is covered twice.
     """
     places = _fans(starts)
     lengths = np.diff(starts)
@@ -100,7 +100,9 @@ def _rows_of_one_length(lengths: _Ints) -> Iterator[_Ints]:
 
 
 def _fan_may_be_wrong(positions: _Floats, polygons: _Ints) -> NDArray[np.bool_]:
-    """Whether a triangle of the fan is turned against the polygon's (Newell) normal, for polygons (corners, m)."""
+    """Whether a triangle of the fan is turned against the polygon's (Newell) normal, or there is none though triangles
+    have areas, for polygons (corners, m).
+    """
     there = ((polygons >= 0) & (polygons < len(positions))).all(axis=0)
     polygons = polygons if there.all() else np.where(there, polygons, 0)
     # By component: NumPy is several times faster along contiguous columns than along rows of three.
@@ -111,8 +113,11 @@ def _fan_may_be_wrong(positions: _Floats, polygons: _Ints) -> NDArray[np.bool_]:
             z[:-1] * x[1:] - x[:-1] * z[1:],
             x[:-1] * y[1:] - y[:-1] * x[1:],
         ]
-        along = sum(component * component.sum(axis=0) for component in cross)
-        wrong: NDArray[np.bool_] = there & (along < 0).any(axis=0)
+        normal = [component.sum(axis=0) for component in cross]
+        along = sum(component * total for component, total in zip(cross, normal, strict=True))
+        # Halves that cancel, as those of a bow-tie, have no normal to be turned against.
+        cancelled = ~np.any(normal, axis=0) & np.any(cross, axis=(0, 1))
+        wrong: NDArray[np.bool_] = there & ((along < 0).any(axis=0) | cancelled)
     return wrong
 
 
@@ -129,10 +134,12 @@ def _cut_notched(positions: _Floats, polygons: _Ints) -> Iterator[tuple[int, _In
         before, after = points[:, 1:-1], points[:, 2:]
         cross = np.cross(before, after)
         normals = cross.sum(axis=1, keepdims=True)
-        normals = normals / np.linalg.norm(normals, axis=2, keepdims=True)
+        lengths = np.linalg.norm(normals, axis=2, keepdims=True)
+        normals = normals / np.where(lengths > 0.0, lengths, 1.0)
         sizes = np.linalg.norm(before, axis=2) * np.linalg.norm(after, axis=2)
-        notched = ((cross * normals).sum(axis=2) < _TURNED_OVER * sizes).any(axis=1)
-        planar = np.ptp((points * normals).sum(axis=2), axis=1) <= _OUT_OF_PLANE
+        turned = (cross * normals).sum(axis=2) < _TURNED_OVER * sizes
+        notched = turned.any(axis=1) | (lengths[:, 0, 0] == 0.0)
+        planar = (np.ptp((points * normals).sum(axis=2), axis=1) <= _OUT_OF_PLANE) & (lengths[:, 0, 0] > 0.0)
         flat = _projected(points, normals[:, 0])
         for k in np.flatnonzero(notched):
             yield begin + int(k), _cut_outline(flat[k]) if planar[k] else None
@@ -146,7 +153,8 @@ def _cut_outline(outline: _Floats) -> _Ints | None:
     places = triangulate_float64(np.ascontiguousarray(outline), np.array([len(outline)], np.uint32))
     triangles = places.reshape(-1, 3).astype(np.int64)
     areas = _doubled_areas(outline, triangles)
-    whole = _doubled_areas(outline, np.arange(len(outline) - 2)[:, None] * [0, 1, 1] + [0, 1, 2]).sum()
+    fan = np.arange(1, len(outline) - 1)
+    whole = _doubled_areas(outline, np.stack([0 * fan, fan, fan + 1], axis=1)).sum()
     right = len(areas) and areas.min() >= -_FLAT and abs(areas.sum() - whole) <= _FLAT * len(outline)
     return triangles if right else None
 

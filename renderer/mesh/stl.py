@@ -39,7 +39,7 @@ def parse_stl(content: bytes, reading: Reading | None = None) -> Mesh:
     reading = reading or Reading()
     names: list[str] = []
     counts: list[int] = []
-    corners = _binary_corners(content, reading)
+    corners: NDArray[np.floating] | None = _binary_corners(content, reading)
     if corners is None:
         text = content.removeprefix(BOM_UTF8).decode("latin-1").replace("\r", "\n")
         corners = _text_corners(text.lower(), reading)

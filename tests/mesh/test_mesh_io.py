@@ -19,6 +19,7 @@ from renderer.errors import MeshError
 from renderer.mesh import obj
 from renderer.mesh.load import load_mesh, save_ply
 from renderer.mesh.mesh import Mesh, RepairWarning
+from renderer.mesh.reading import Reading
 from renderer.mesh.shapes import torus
 
 pytestmark = pytest.mark.judges("Mesh", "Mesh.triangles", "MeshError", "load_mesh")
@@ -259,8 +260,8 @@ def test_obj_faces(tmp_path: Path, text: str, faces: Any) -> None:
     ("text", "message"),
     [
         ("", "holds no faces"),
-        (V + "f 1 2 5\n", "line 5: face index out of range: expected 1 to 4 or -4 to -1, got 'f 1 2 5'"),
-        (V + "f 1/1 2/1 3/1\n", "line 5: face index out of range"),
+        (V + "f 1 2 5\n", "line 5: vertex index out of range: expected 1 to 4 or -4 to -1, got 'f 1 2 5'"),
+        (V + "f 1/1 2/1 3/1\n", "line 5: vertex index out of range"),
         (V + "f 1 2 3\nf 1 2\n", "line 6: expected a face of at least 3 vertices, got 'f 1 2'"),
         (V + "f 1 2 x\n", "line 5: "),
         (V + "f 1/1/1/1 2 3\n", "line 5: expected a corner like"),
@@ -325,10 +326,10 @@ def test_obj_attributes_may_stand_after_their_faces(tmp_path: Path) -> None:
 @cases(
     ("text", "message"),
     [
-        ("f 1 2 5\n" + V, "line 1: face index out of range: expected 1 to 4 or -0 to -1, got 'f 1 2 5'"),
-        ("v 0 0 0\nf 1 2 -2\n" + V, "line 2: face index out of range: expected 1 to 5 or -1 to -1, got 'f 1 2 -2'"),
-        ("f 1/2 2/1 3/1\nvt 0 0\n" + V, "line 1: face index out of range: expected 1 to 1 or -0 to -1"),
-        (V + "f 1 2 99999999999999999999\n", "line 5: face index out of range: expected 1 to 4 or -4 to -1"),
+        ("f 1 2 5\n" + V, "line 1: vertex index out of range: expected 1 to 4 or -0 to -1, got 'f 1 2 5'"),
+        ("v 0 0 0\nf 1 2 -2\n" + V, "line 2: vertex index out of range: expected 1 to 5 or -1 to -1, got 'f 1 2 -2'"),
+        ("f 1/2 2/1 3/1\nvt 0 0\n" + V, "line 1: vertex index out of range: expected 1 to 1 or -0 to -1"),
+        (V + "f 1 2 99999999999999999999\n", "line 5: vertex index out of range: expected 1 to 4 or -4 to -1"),
         (V + "f 1 2 3 0x1\n", "line 5: "),
         ("v 0 0 0x10\n" + V + "f 1 2 3\n", "line 1: could not convert string to float: '0x10', got 'v 0 0 0x10'"),
     ],
@@ -363,7 +364,7 @@ def read_both(content: bytes) -> bool:
     common = obj._read_common(content)
     if common is None:
         return False
-    for name, value in vars(obj._read_any(content, keeps_bad_faces=False)).items():
+    for name, value in vars(obj._read_any(content, Reading())).items():
         other = getattr(common, name)
         assert (value is None) == (other is None), name
         if name == "groups":
@@ -487,7 +488,7 @@ def test_path_faults(tmp_path: Path) -> None:
     for name, message in [
         ("missing.ply", "cannot be read: No such file or directory"),
         ("folder.ply", "cannot be read: Is a directory"),
-        ("model.fbx", "expected a suffix of .ply, .obj, .stl, .glb, got '.fbx'"),
+        ("model.fbx", "expected a suffix of .ply, .obj, .stl, .glb, .gltf, got '.fbx'"),
         ("model", "got ''"),
         ("null\0.ply", "cannot be read: "),
     ]:
