@@ -216,8 +216,8 @@ def test_polygons_without_area_and_without_numbers_keep_their_fan(outline: Outli
 def test_a_cut_that_does_not_cover_the_polygon_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever the library gives: triangles turned over, one that is missing, none at all."""
     good = np.array(cut(placed(L_SHAPE)), np.uint32)
-    for given in (good[:, ::-1], good[:-1], good[:0]):
-        monkeypatch.setattr("mapbox_earcut.triangulate_float64", lambda *_, flat=given: flat.ravel())
+    for bad in (good[:, ::-1], good[:-1], good[:0]):
+        monkeypatch.setattr("mapbox_earcut.triangulate_float64", lambda *_, flat=bad: flat.ravel())
         assert cut_of(placed(L_SHAPE)).wrong.tolist() == [0]
 
 
