@@ -52,7 +52,7 @@ def _samples_figure(pictures: Mapping[str, Any]) -> dict[str, str]:
     for quantity, label in _QUANTITIES.items():
         best = [named[name] for name in pictures["fronts"][quantity]]
         series = [
-            _curve(f"{c['who']}, RMSE ~ N^{c['slope_value']['rmse']:.2f}", c, quantity, look)
+            curve(f"{c['who']}, RMSE ~ N^{c['slope_value']['rmse']:.2f}", c, quantity, look)
             for look, c in enumerate(curves)
         ]
         front = Series("Pareto front", [p["seconds"] for p in best], [p[quantity] for p in best], PLAIN)
@@ -71,7 +71,7 @@ def _truncation_figure(pictures: Mapping[str, Any]) -> dict[str, str]:
     curves = [c for c in pictures["curves"] if c["knob"] != "samples"]
     panels = [
         Panel(
-            [_curve(f"{c['who']}, {_PARAMETERS[c['knob']]}", c, quantity, look) for look, c in enumerate(curves)], label
+            [curve(f"{c['who']}, {_PARAMETERS[c['knob']]}", c, quantity, look) for look, c in enumerate(curves)], label
         )
         for quantity, label in _QUANTITIES.items()
     ]
@@ -83,7 +83,8 @@ def _truncation_figure(pictures: Mapping[str, Any]) -> dict[str, str]:
     return {"title": title, "svg": draw(panels, x_label="seconds", title="Pictures: truncation against run time")}
 
 
-def _curve(name: str, curve: Mapping[str, Any], quantity: str, look: int) -> Series:
-    points = curve["points"]
+def curve(name: str, record: Mapping[str, Any], quantity: str, look: int) -> Series:
+    """A quantity of one curve of the record against its seconds."""
+    points = record["points"]
     errors = [p[quantity] if p[quantity] > _ROUNDOFF else None for p in points]
     return Series(name, [p["seconds"] for p in points], errors, look)

@@ -71,12 +71,15 @@ def loglog(series: Sequence[Series], *, x_label: str, y_label: str, title: str) 
     return draw([Panel(series, y_label)], x_label=x_label, title=title)
 
 
-def draw(panels: Sequence[Panel], *, x_label: str, title: str) -> str:
-    """Panels below each other, the first one the largest, with one x axis and one legend; see ``loglog``."""
+def draw(panels: Sequence[Panel], *, x_label: str, title: str, size: tuple[int, int] = (600, 360)) -> str:
+    """Panels below each other, with one x axis and one legend; the first one is the largest, of ``size`` pixels.
+
+    See ``loglog``.
+    """
     bad = [x for panel in panels for s in panel.series for x in s.x if not 0.0 < x < math.inf]
     if bad:
         raise ValueError(f"series: expected positive, finite x for {title!r}, got {bad[0]}")
-    identity = hashlib.sha256(repr((panels, x_label, title)).encode()).hexdigest()[:10]
+    identity = hashlib.sha256(repr((panels, x_label, title, size)).encode()).hexdigest()[:10]
     settings: dict[Any, Any] = {
         "svg.hashsalt": identity, "svg.fonttype": "none", "font.family": _FONT, "font.size": 9.0,
         "axes.edgecolor": _GREY, "xtick.color": _GREY, "ytick.color": _GREY, "xtick.labelcolor": _INK,
@@ -84,8 +87,8 @@ def draw(panels: Sequence[Panel], *, x_label: str, title: str) -> str:
         "axes.spines.top": False, "axes.spines.right": False,
     }  # fmt: skip
     with matplotlib.rc_context(settings):
-        height = 360.0 + 150.0 * (len(panels) - 1)
-        figure = Figure(figsize=(600 / _PIXELS, height / _PIXELS), dpi=_PIXELS, layout="constrained")
+        width, height = size[0], size[1] + 150 * (len(panels) - 1)
+        figure = Figure(figsize=(width / _PIXELS, height / _PIXELS), dpi=_PIXELS, layout="constrained")
         figure.patch.set_visible(False)
         ratios = [2.4] + [1.0] * (len(panels) - 1)
         rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
