@@ -17,8 +17,8 @@ def stability_figures(record: Mapping[str, Any]) -> list[dict[str, str]]:
 def _error_figure(name: str, sweep: Mapping[str, Any]) -> dict[str, str]:
     wrong = Panel(_by_kernel(sweep, "wrong_share"), "wrong", share=True)
     title = (
-        f"Error against {name}: the largest of {sweep['points'][0]['rays']} rays at each point, and the share of wrong answers "
-        f"(missed, falsely hit, or another face). An error of 0 is drawn at {FLOOR:.0e}."
+        f"Error against {name}: the largest of {sweep['points'][0]['rays']} rays at each point, and the share of wrong "
+        f"answers (missed, falsely hit, or another face). An error of 0 is drawn at {FLOOR:.0e}."
     )
     shown = draw([error_panel(sweep), wrong], x_label=sweep["label"], title=f"Error of t against {name}")
     return {"title": title, "svg": shown}

@@ -60,9 +60,7 @@ def shown(found: dict[str, Any]) -> str:
     environment = Environment(loader=FileSystemLoader(page._TEMPLATES), undefined=StrictUndefined)
     environment.filters["number"] = page.number
     environment.globals["partials"] = chapters.PARTIALS
-    return environment.get_template("promises.html").render(
-        m={"promises": {"rows": [], "names": found}}, row={"failed": 0}
-    )
+    return environment.get_template("promises.html").render(m={"promises": {"rows": [], "names": found}})
 
 
 def test_the_report_shows_who_judges_each_name_and_is_red_where_nobody_does(checkout: Path) -> None:

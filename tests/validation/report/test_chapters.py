@@ -13,7 +13,7 @@ from validation.report import chapters, summary
 from validation.report import page as report
 
 PARTIAL = """{% from "macros.html" import fold %}<p>What {{ row.section }} found.</p>
-{% call fold(row, "More") %}{% if row.section == "images" %}<h3 id="picture-glass">glass</h3>{% endif %}
+{% call fold(row.failed, "More") %}{% if row.section == "images" %}<h3 id="picture-glass">glass</h3>{% endif %}
 <p>All of {{ row.section }}.</p>{% endcall %}"""
 KERNELS = ("ours", "embree_default", "embree_robust")
 POINTS = [{"x": x} | {kernel: {"relative_max": 1e-7} for kernel in KERNELS} for x in (1.0, 10.0)]
