@@ -156,6 +156,8 @@ def test_a_real_defect_is_caught_and_a_harmless_change_is_not(tiny: defects.Modu
     assert [gate.passed for gate in judged] == [True, True, False]
     drawn = page_of(found)
     assert "1 of 2 seeded defects were caught" in drawn and "not caught" in drawn
+    # They are no part of the run's verdict, so they have none of its colours.
+    assert "good" not in drawn and "bad" not in drawn
 
 
 def test_an_interrupted_run_goes_on(tmp_path: Path, tiny: defects.Modules) -> None:
