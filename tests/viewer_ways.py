@@ -102,6 +102,7 @@ def phong(case: Case) -> tuple[Any, Any]:
 
 
 def proof_by_brute_force(case: Case) -> tuple[Any, Any]:
+    case = replace(case, settings=case.settings | {"pair": "brute"})
     found = compared(case.shown, case.message("view", seq=1, mode="proof"), case.size, lambda share: None)
     return found.pictures, [case.picture(samples=1).radiance] * 2
 

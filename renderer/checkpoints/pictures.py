@@ -129,5 +129,5 @@ def digest_of_scene(scene: Scene, needs: Features) -> str:
     # The media are those around the scene's own camera, which is the view's; around any they depend on how the mesh is
     # divided into bodies.
     bodies = np.array([len(instance.mesh.faces) for instance in scene.instances], np.int64)
-    shown = (array for name, array in arrays._asdict().items() if name != "media")
+    shown = (np.asarray(array) for name, array in arrays._asdict().items() if name != "media")
     return digest_of(mesh.vertices, mesh.faces, bodies, *shown)

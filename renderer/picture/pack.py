@@ -10,6 +10,7 @@ from renderer.scene.light import light_row
 from renderer.scene.material import kind_of, material_row
 from renderer.scene.needs import Features, lit_materials, needs_of
 from renderer.scene.scene import Scene
+from renderer.scene.sky import sky_rows
 from renderer.shade.records import KIND, LAMBERT, LIGHT_COLUMNS, MATERIAL_COLUMNS, PHONG, UNLIT
 from renderer.shade.surface import MAX_MEDIA, SceneArrays
 
@@ -40,7 +41,7 @@ def pack(scene: Scene, needs: Features | None = None) -> tuple[Mesh, SceneArrays
         materials=_materials(scene, needs),
         lights=light_rows(scene, needs),
         colors=np.array([scene.ambient, scene.background]),
-        sky=np.zeros((0, 3)) if scene.sky is None else scene.sky.rows(scene.up),
+        sky=sky_rows(scene.sky, scene.up),
         media=media_around(scene, scene.camera) if needs.refraction else np.zeros(0, np.int64),
         touching=np.zeros(0, np.uint8),
         soft=scene.render.terminator == "soft",

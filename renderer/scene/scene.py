@@ -495,7 +495,7 @@ class Scene(Fields):
         >>> scene = load_scene("scenes/stairs.toml")
         >>> dark = scene.altered(lights=())
         >>> len(scene.lights), len(dark.lights), dark.instances is scene.instances
-        (2, 0, True)
+        (1, 0, True)
         """
         for name in changes:
             if name in _PLACED:

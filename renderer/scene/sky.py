@@ -94,7 +94,25 @@ class Sky(Fields):
         return value
 
     def directional(self, up: str) -> tuple[DirectionalLight, ...]:
-        """The lights that stand for the sky over the axis ``up``, then those that stand for the sun."""
+        """The lights that stand for the sky, then those that stand for the sun.
+
+        Parameters
+        ----------
+        up : {"x", "y", "z"}
+            The axis upwards.
+
+        Returns
+        -------
+        tuple of DirectionalLight
+            ``lights`` of them over the hemisphere, and ``sun_lights`` over the sun's disc if there is a sun.
+
+        Examples
+        --------
+        >>> from renderer import Sky
+        >>> sky = Sky(sun=(0, 0, -1), sun_lights=8)
+        >>> len(sky.directional("z"))
+        104
+        """
         made: list[DirectionalLight] = []
         # From patterns about z to those about ``up``, so that a turned scene has turned lights.
         turn = turn_to(up) @ turn_to("z").T
@@ -120,7 +138,10 @@ class Sky(Fields):
         turned = Pattern(np.column_stack([level * around[:, None], height]), spread.weights)
         return turned.about([sun])[0]
 
-    def rows(self, up: str) -> NDArray[np.float64]:
-        """The sky as the kernels read it, (4, 3): the unit vector up, then zenith, horizon and ground."""
-        ground = self.horizon if self.ground is None else self.ground
-        return np.array([np.eye(3)[UP_AXES[up]], self.zenith, self.horizon, ground])
+
+def sky_rows(sky: Sky | None, up: str) -> NDArray[np.float64]:
+    """The sky as the kernels read it, (4, 3): the unit vector up, then zenith, horizon and ground; (0, 3) for none."""
+    if sky is None:
+        return np.zeros((0, 3))
+    ground = sky.horizon if sky.ground is None else sky.ground
+    return np.array([np.eye(3)[UP_AXES[up]], sky.zenith, sky.horizon, ground])

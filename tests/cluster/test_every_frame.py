@@ -75,11 +75,11 @@ def frame_of(scene: Scene, varied: Scene, other: Variation) -> Scene:
 
 @pytest.mark.parametrize("other", VARIATIONS, ids=str)
 def test_a_frame_has_the_bits_of_its_scene_alone_and_takes_over_no_other(
-    bases: dict[str, Scene], folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, prepared: object,
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, prepared: object,
     other: Variation,
 ) -> None:  # fmt: skip
     """Frames that an earlier animation left, of the same folder and names, are rendered again where they differ."""
-    base, varied = bases[other.table["camera"]["type"]], scene_of(folder, other.varied())
+    base, varied = scene_of(folder, other.table), scene_of(folder, other.varied())
     scenes = [base, frame_of(base, varied, other)]
     expected = [picture(scene).radiance.tobytes() for scene in (base, varied)]
     outputs = [tmp_path / "0.npy", tmp_path / "1.npy"]
@@ -133,9 +133,7 @@ def test_a_worker_gives_other_pictures_of_a_scene_that_it_has(
 
 
 @cases("other", [other for other in VARIATIONS if other.keys[0] in ("camera", "render")])
-def test_a_prepared_scene_takes_the_picture_of_another_camera_or_setting(
-    bases: dict[str, Scene], folder: Path, other: Variation
-) -> None:
-    stage, varied = prepare(bases[other.table["camera"]["type"]]), scene_of(folder, other.varied())
+def test_a_prepared_scene_takes_the_picture_of_another_camera_or_setting(folder: Path, other: Variation) -> None:
+    stage, varied = prepare(scene_of(folder, other.table)), scene_of(folder, other.varied())
     found, expected = picture(stage, camera=varied.camera, **varied.render.model_dump()), picture(varied)
     assert found.radiance.tobytes() == expected.radiance.tobytes()

@@ -72,7 +72,7 @@ def test_one_sharp_edge_does_not_part_what_is_smooth_around_it() -> None:
     assert len({tuple(n) for n in corner_normals(mesh.creased(limit))[:, 0]}) == 1
 
 
-@pytest.mark.judges("SceneObject.crease")
+@pytest.mark.judges("scene.objects.crease")
 def test_an_object_is_creased_where_it_stands_and_keeps_the_normals_of_its_file() -> None:
     """Stretched, a wall that was sharp is not."""
     roof = Mesh([[0, 0, 0], [0, 2, 0], [1, 0, 1], [1, 2, 1], [2, 0, 0], [2, 2, 0]],

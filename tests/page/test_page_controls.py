@@ -287,7 +287,9 @@ def test_two_clicks_on_the_card_turn_about_nothing(viewer: Viewer) -> None:
 
 
 def test_a_ray_is_seen_from_the_side_beside_its_card(viewer: Viewer) -> None:
-    """Its middle was the picture's, beneath the card."""
+    """Its middle was the picture's, beneath the card, which lies over the picture where the panel is closed."""
+    viewer.page.click("#toggle-panel")
+    viewer.settled("octree")
     viewer.page.mouse.click(viewer.centre()[0] + 40, viewer.centre()[1] + 30)
     viewer.page.click("#card >> text=View from the side")
     card, frame = (viewer.page.locator(name).bounding_box() for name in ("#card", "#frame"))
@@ -300,6 +302,7 @@ def test_a_ray_is_seen_from_the_side_beside_its_card(viewer: Viewer) -> None:
     assert abs((end - start) @ back) < 0.3 * math.dist(start, end)  # across the view, but for the tilt
     middle = place(viewer, ((start + end) / 2).tolist())
     assert middle[0] == pytest.approx((left + right) / 2)
+    viewer.page.click("#toggle-panel")
 
 
 def test_the_divider_goes_to_its_ends(viewer: Viewer) -> None:

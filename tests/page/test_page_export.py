@@ -17,17 +17,18 @@ def test_the_page_saves_a_still(viewer: Viewer, scenes: Path, tmp_path: Path) ->
     shared(viewer)
     before = viewer.pixels("picture")
     viewer.page.select_option("#still-size", "1920x1080")
+    viewer.page.evaluate("() => (viewer.panel.fields.refine.value = '16')")  # as if the view had rested
     with viewer.page.expect_download() as download:
         viewer.page.click("#export-still")
         viewer.page.wait_for_selector("#exporting:not([hidden])")
         assert viewer.page.is_disabled("#export-still") and viewer.page.is_disabled("#export-turntable")
     assert download.value.suggested_filename == "blocks-1920x1080.png"
     download.value.save_as(tmp_path / "still.png")
+    viewer.page.wait_for_selector("#exporting", state="hidden")
+    assert viewer.page.is_enabled("#export-still") and "16 samples a pixel" in viewer.page.inner_text("#notices")
     # With as many samples as the view at rest.
     expected = seen_by(viewer.camera, load_scene(scenes / "blocks.toml"), resolution=(1920, 1080), samples=16).srgb
     assert np.array_equal(decoded((tmp_path / "still.png").read_bytes()), expected)
-    viewer.page.wait_for_selector("#exporting", state="hidden")
-    assert viewer.page.is_enabled("#export-still") and "16 samples a pixel" in viewer.page.inner_text("#notices")
     assert np.array_equal(viewer.pixels("picture"), before)  # the view stays
 
 

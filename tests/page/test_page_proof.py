@@ -43,7 +43,7 @@ def test_the_page_shows_both_pictures_and_the_difference(page: Viewer) -> None:
     assert f"{told['identical']:,} of {told['pixels']:,} pixels are identical" in text
     assert page.page.is_visible("#legend") and page.page.is_hidden("#divider")
     page.page.locator("#stage").press("x")
-    page.page.select_option("[name=pair]", "brute")
+    page.page.evaluate("() => (viewer.panel.fields.pair.value = 'brute')")
     _, told = kept(page)
     assert told["identical"] == told["pixels"]
     assert f"All {told['pixels']:,} pixels are identical to the bit" in page.page.inner_text("#proof output")
@@ -71,6 +71,7 @@ def test_the_divider_moves_by_pointer_and_by_key_and_the_camera_does_not(page: V
 
 
 def test_a_clicked_pixel_of_the_proof_shows_both_values(page: Viewer) -> None:
+    page.page.evaluate("() => (viewer.panel.fields.pair.value = 'brute')")
     page.choose("proof")
     x, y = page.centre()
     page.page.mouse.click(x + 60, y + 20)
@@ -120,6 +121,7 @@ OTHER_PAIR = """() => {
 def test_the_values_on_the_card_are_those_of_the_proof_that_stands(page: Viewer) -> None:
     """After an edit they stayed those of the scene before, for ever."""
     page.page.select_option("[name=size]", "0.25")
+    page.page.evaluate("() => (viewer.panel.fields.pair.value = 'brute')")
     page.choose("proof")
     x, y = page.centre()
     page.page.mouse.click(x + 60, y + 20)

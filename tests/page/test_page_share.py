@@ -120,7 +120,7 @@ def test_the_file_has_the_picture_to_the_pixel(file: Saved, made: Made) -> None:
     box = file.page.locator("#picture").bounding_box()
     assert abs(box["width"] / box["height"] - made.picture.shape[1] / made.picture.shape[0]) < 0.01
     text = file.page.inner_text("#hud")
-    assert text == f"Octree · {made.picture.shape[1]} × {made.picture.shape[0]}"
+    assert text == f"Ray traced · {made.picture.shape[1]} × {made.picture.shape[0]}"
 
 
 def test_boxes_and_the_ray_lie_over_the_picture_and_can_be_switched(file: Saved) -> None:

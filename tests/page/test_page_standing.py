@@ -58,11 +58,12 @@ def test_the_first_traced_picture_stands_until_a_finer_one_comes(odd: Viewer) ->
 
 
 def test_brute_force_begins_with_the_octrees_picture(odd: Viewer) -> None:
-    """It is the same one; WebGL's model stood there for the seconds that brute force took."""
+    """It is the same one, and a label says which; WebGL's model stood there for the seconds that brute force took."""
     odd.page.evaluate(WATCH)
-    odd.choose("brute")
+    odd.page.evaluate("() => viewer.setMode('brute')")
     odd.page.wait_for_selector("#until:not([hidden])")
-    assert set(odd.page.evaluate(WATCHED)) == {odd.camera["w"]}
+    odd.settled("brute")
+    assert odd.page.is_hidden("#until") and set(odd.page.evaluate(WATCHED)) == {odd.camera["w"]}
 
 
 def test_of_two_pictures_the_newer_and_finer_one_stands(viewer: Viewer) -> None:

@@ -240,7 +240,7 @@ def test_a_longer_lens_sees_less_from_the_same_eye(viewer: Viewer, scenes: Path)
 
 def address(viewer: Viewer) -> str:
     """The address once the page has written the view that it shows."""
-    viewer.page.wait_for_function("() => !viewer.writing")
+    viewer.page.wait_for_function("() => viewer.past.timer === null")
     return viewer.page.url
 
 
@@ -300,13 +300,13 @@ def test_the_address_has_the_mode_and_what_a_proof_compares(viewer: Viewer) -> N
     told(viewer)
     viewer.page.evaluate("() => viewer.setMode('proof')")
     assert told(viewer)["mode"] == ["proof"] and "pair" not in told(viewer)
-    viewer.page.select_option("[name=pair]", "samples")
-    link = address(viewer)
-    assert parse_qs(link.split("#")[1])["pair"] == ["samples"]
     viewer.page.select_option("[name=pair]", "brute")
+    link = address(viewer)
+    assert parse_qs(link.split("#")[1])["pair"] == ["brute"]
+    viewer.page.select_option("[name=pair]", "samples")
     address(viewer)
     viewer.page.evaluate("(hash) => (location.hash = hash)", link.split("#")[1])
-    viewer.page.wait_for_function("() => viewer.panel.settings.pair === 'samples'")
+    viewer.page.wait_for_function("() => viewer.panel.settings.pair === 'brute'")
     viewer.page.evaluate("() => viewer.setMode('octree')")
     settled(viewer)
 
@@ -338,7 +338,7 @@ def test_an_address_counts_though_the_page_writes_its_own(viewer: Viewer) -> Non
         """() => new Promise((told) => {
             addEventListener("hashchange", () => setTimeout(() => told(viewer.panel.settings.samples)), { once: true });
             location.hash = "#samples=16";
-            viewer.writeAddress();
+            viewer.past.write();
         })"""
     )
     assert samples == 16
@@ -396,17 +396,19 @@ def test_a_scene_is_saved_after_its_diff_was_seen(browser: Any, tmp_path: Path) 
         assert page.page.evaluate("() => viewer.panel.settings.edits ?? null") is None
 
 
-def test_everything_is_folded_at_first_and_as_it_was_left_later(browser: Any, url: str) -> None:
+def test_scene_and_readings_are_open_at_first_and_parts_as_they_were_left_later(browser: Any, url: str) -> None:
     with Viewer(browser, url, folded=True, viewport={"width": 1280, "height": 800}) as page:
         page.open()
-        assert page.page.locator("aside details[open]").count() == 0 and page.page.is_visible("#panel")
+        opened = "() => [...document.querySelectorAll('aside details[open]')].map((one) => one.id)"
+        assert page.page.evaluate(opened) == ["fold-scene", "fold-readings"] and page.page.is_visible("#panel")
         page.page.click("#fold-octree > summary")
         page.page.wait_for_function("() => JSON.parse(localStorage['octree-render-folds'] ?? '{}')['fold-octree']")
         page.page.click("#toggle-panel")
         assert page.page.is_hidden("#panel")
         page.page.reload()
         page.page.wait_for_selector("body[data-ready]")
-        assert page.page.is_hidden("#panel") and page.page.locator("aside details[open]").count() == 1
+        assert page.page.is_hidden("#panel")
+        assert page.page.evaluate(opened) == ["fold-scene", "fold-octree", "fold-readings"]
         page.page.set_viewport_size({"width": 900, "height": 700})
     with Viewer(browser, url, folded=True, viewport={"width": 900, "height": 700}) as narrow:
         narrow.open()
@@ -448,3 +450,82 @@ def test_the_sun_turns_about_the_axis_that_is_up(browser: Any, tmp_path: Path) -
         fields = [page.page.locator(f"#lights details [aria-label='direction, {axis}']").first for axis in "xyz"]
         found = [float(field.input_value()) for field in fields]
         np.testing.assert_allclose(found, light.direction, atol=1e-12)
+
+
+def test_each_change_is_undone_and_done_again(browser: Any, url: str) -> None:
+    """A drag is one step, an edit another; the browser's Back is Undo, and the first view is the end of it."""
+    with Viewer(browser, url) as page:
+        page.open()
+        told(page)
+        assert page.page.is_disabled("#undo")
+        first = page.camera
+        page.drag(60, 10)
+        settled(page)
+        told(page)
+        turned = page.camera
+        unfold(page, RED)
+        green = page.page.locator(f"{RED} [aria-label='diffuse, green']")
+        green.fill("0.5")
+        settled(page)
+        told(page)
+        page.page.locator("#stage").press("Control+z")
+        page.page.wait_for_function("() => !viewer.panel.settings.edits")
+        settled(page)
+        assert (
+            page.camera == turned and page.page.locator(f"{RED} [aria-label='diffuse, green']").input_value() == "0.1"
+        )
+        page.page.go_back()
+        page.page.wait_for_function(
+            "(m) => String(viewer.camera.matrix()) === m", arg=page.page.evaluate("(m) => String(m)", first["m"])
+        )
+        settled(page)
+        assert told(page) is not None and page.page.is_disabled("#undo")
+        page.page.locator("#stage").press("Control+z")  # nothing before: the page stays
+        for _ in range(2):
+            page.page.click("#redo")
+            page.page.wait_for_timeout(300)
+        page.page.wait_for_function("() => viewer.panel.settings.edits?.materials.red.diffuse[1] === 0.5")
+        settled(page)
+        assert page.camera == turned
+
+
+FAULTS = [
+    ("diffuse, green", "", "Expected a number", "0.1"), ("diffuse, green", "-1", "Expected at least 0", "0.1"),
+    ("shininess", "-3", "Expected at least 0", "40"),
+]  # fmt: skip
+
+
+@cases("fault", FAULTS)
+def test_a_number_that_is_none_is_said_and_gives_way_to_the_last(viewer: Viewer, fault: tuple[str, ...]) -> None:
+    label, typed, says, before = fault
+    unfold(viewer, RED)
+    field = viewer.page.locator(f"{RED} [aria-label='{label}']")
+    field.fill(typed)
+    assert viewer.page.inner_text(f"{RED} .fault:not([hidden])") == says
+    assert field.get_attribute("aria-invalid") == "true"
+    assert viewer.page.evaluate("() => viewer.panel.settings.edits ?? null") is None
+    field.blur()
+    assert field.input_value() == before and viewer.page.locator(f"{RED} .fault:not([hidden])").count() == 0
+
+
+def test_a_light_has_a_direction(viewer: Viewer) -> None:
+    viewer.page.evaluate("() => document.querySelectorAll('#lights details').forEach((one) => (one.open = true))")
+    fields = [viewer.page.locator(f"#lights [aria-label='direction, {axis}']").first for axis in "xyz"]
+    for field in fields:
+        field.fill("0")
+    assert "Expected a direction" in viewer.page.inner_text("#lights .fault:not([hidden])")
+
+
+def test_lights_that_the_preview_leaves_out_are_counted(viewer: Viewer) -> None:
+    for _ in range(8):
+        viewer.page.click("#lights >> text=Add directional light")
+    assert "first 8 of these" in viewer.page.inner_text("#lights .note:not([hidden])")
+
+
+def test_another_type_of_material_begins_with_its_own_values(viewer: Viewer) -> None:
+    """A mirror made of dark stone reflected a fifth."""
+    stone = "#materials [data-name=stone]"
+    unfold(viewer, stone)
+    viewer.page.select_option(f"{stone} select", "mirror")
+    fields = viewer.page.evaluate("() => viewer.panel.settings.edits.materials.stone")
+    assert fields == {"type": "mirror", "reflectance": [1, 1, 1]}

@@ -255,7 +255,7 @@ def test_info_says_what_is_needed_and_why(capsys: pytest.CaptureFixture[str], tm
     assert main(["info", str(SCENES / "stairs.toml")]) == 0
     lines = capsys.readouterr().out.splitlines()[-8:]
     assert [line[2:18].strip().replace(" ", "_") for line in lines] == [f.name for f in fields(Needs)]
-    assert lines[0].endswith(" left out: no material reflects") and lines[5].endswith(" needed: 2 of 2 lights shine")
+    assert lines[0].endswith(" left out: no material reflects") and lines[5].endswith(" needed: 25 of 25 lights shine")
     needs = needs_of(load_scene(SCENES / "stairs.toml"))
     assert [" needed: " in line for line in lines] == [bool(value) for value in asdict(needs).values()]
 

@@ -35,7 +35,7 @@ def level(up: str) -> Scene:
     return Scene(camera=camera, materials={"white": Phong(diffuse=1.0)}, objects=[floor], up=up)
 
 
-@pytest.mark.judges("Sky.zenith", "Sky.horizon", "Sky.ground", "Scene.sky")
+@pytest.mark.judges("scene.sky", "scene.sky.zenith", "scene.sky.horizon", "scene.sky.ground")
 @pytest.mark.parametrize("up", ["x", "y", "z"])
 @pytest.mark.parametrize("ground", [GROUND, None])
 def test_a_ray_that_misses_sees_the_sky_of_its_direction(up: Any, ground: Any) -> None:
@@ -59,7 +59,7 @@ def test_a_mirror_shows_the_sky() -> None:
     assert not needs_of(scene).shadows
 
 
-@pytest.mark.judges("Sky.lights")
+@pytest.mark.judges("scene.sky.lights", "Sky.directional")
 @pytest.mark.parametrize("up", ["x", "y", "z"])
 def test_level_ground_has_the_integral_of_the_sky(up: Any) -> None:
     """Of (h + (z - h) s) s over the hemisphere, over pi: h / 3 + 2 z / 3. The midpoint rule errs by 1 / 6 n^2."""
@@ -70,7 +70,7 @@ def test_level_ground_has_the_integral_of_the_sky(up: Any) -> None:
     np.testing.assert_allclose(lit.radiance[0, 0], wanted, rtol=1e-6)
 
 
-@pytest.mark.judges("Sky.sun", "Sky.sun_irradiance", "Sky.sun_angle", "Sky.sun_lights")
+@pytest.mark.judges("scene.sky.sun", "scene.sky.sun_irradiance", "scene.sky.sun_angle", "scene.sky.sun_lights")
 def test_level_ground_has_the_integral_of_the_suns_disc() -> None:
     """The mean of its cosines is half of 1 + cos a, for the sun straight above; every light is within the angle."""
     sky = Sky(lights=0, sun=(0, -2, 0), sun_irradiance=(0.3, 0.6, 0.9), sun_angle=30.0, sun_lights=40)

@@ -14,7 +14,7 @@ from renderer.viewer.payload import description, mesh_payload
 from renderer.viewer.shown import open_file
 
 # What the server alone goes by.
-UNTOLD = ("min_weight", "max_rays")
+UNTOLD = ("min_weight", "max_rays", "glass_shadows")
 
 
 def fetched(folder: Path, table: Any) -> tuple[str, bytes]:

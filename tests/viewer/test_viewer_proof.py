@@ -104,7 +104,7 @@ def proof(client: Client, **changes: Any) -> tuple[list[dict[str, Any]], list[Go
 
 
 def test_octree_and_brute_force_are_the_same_to_the_bit(client: Client, scene: Path) -> None:
-    told, got = proof(client)
+    told, got = proof(client, settings={"pair": "brute"})
     assert [(p.w, p.h, p.last) for p in got] == [(128, 96, 0), (200, 150, 1)]
     expected = srgb(rendered(load_scene(scene)).radiance)
     one, other, heat = parts(got[-1])
@@ -121,7 +121,7 @@ def test_a_wrong_brute_force_is_seen(scene: Path, monkeypatch: pytest.MonkeyPatc
     shown = open_file(scene)
     faces = shown.brute.tree.blocks.copy()
     with renderer.view(scene, browser=False) as viewing, Client(viewing.url) as client:
-        told, _ = proof(client, settings={"shadows": False})
+        told, _ = proof(client, settings={"pair": "brute", "shadows": False})
         assert told[-1]["identical"] == told[-1]["pixels"]
         computed = compare._computed
 
@@ -131,7 +131,7 @@ def test_a_wrong_brute_force_is_seen(scene: Path, monkeypatch: pytest.MonkeyPatc
             return radiance, rays
 
         monkeypatch.setattr(compare, "_computed", wrong)
-        told, _ = proof(client, settings={"shadows": False})
+        told, _ = proof(client, settings={"pair": "brute", "shadows": False})
     assert told[-1]["identical"] == told[-1]["pixels"] - 1 and told[-1]["at"] == [11, 7]
     assert told[-1]["largest"] == pytest.approx(2.0**-20, rel=0.2) and faces.size
 
@@ -226,7 +226,7 @@ def test_a_reference_ends_with_a_server_that_is_killed(silent: Callable[[], int]
 def test_what_cannot_be_told_keeps_no_later_picture_waiting(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its acknowledgement was waited for, and no view was answered from then on."""
     monkeypatch.setattr(Comparison, "described", lambda comparison: {"largest": float("nan")})
-    told, got = proof(client, w=64, h=48)
+    told, got = proof(client, w=64, h=48, settings={"pair": "brute"})
     assert not got and "JSON" in told[-1]["message"]
     assert client.final(w=64, h=48).last
 

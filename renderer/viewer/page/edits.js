@@ -1,6 +1,7 @@
 // Materials and lights as the user changes them: their lists in the panel, and what differs from the scene's file.
 import { element, swatch } from "./element.js";
 import { numberField, pickerColor, vectorField } from "./fields.js";
+import { MAX_LIGHTS } from "./model.js";
 
 const [COLOR, VECTOR, NUMBER] = ["color", "vector", "number"];
 // The fields of each type in the order in which they are shown, with their kind and what a new one has.
@@ -127,7 +128,9 @@ export class Edits {
     const { lights } = this.now;
     this.entries = new Map(lights.map((fields, i) => [fields, this.light(fields, i, fields === added || before.get(fields)?.open)]));
     const add = (type) => this.button(`Add ${type} light`, () => this.addLight(type));
-    this.lists.lights.replaceChildren(...this.entries.values(), element("div", { className: "buttons" }, add("directional"), add("point")));
+    const dark = lights.length - (MAX_LIGHTS - this.scene.skylights.length);
+    const note = element("p", { className: "note", hidden: dark <= 0, textContent: `Preview draws the first ${lights.length - dark} of these.` });
+    this.lists.lights.replaceChildren(...this.entries.values(), note, element("div", { className: "buttons" }, add("directional"), add("point")));
   }
 
   // The dots of materials and lights in their colours, and which of the materials are changed.
@@ -166,7 +169,7 @@ export class Edits {
         this.changed();
       };
       if (kind === NUMBER) return numberField(name, fields[name], LEAST[name], set);
-      return vectorField(name, fields[name], kind === COLOR, set);
+      return vectorField(name, fields[name], { isColor: kind === COLOR, isDirection: name === "direction" }, set);
     });
   }
 
@@ -182,19 +185,17 @@ export class Edits {
     type.addEventListener("change", () => {
       const key = (of) => JSON.stringify([name, of]);
       this.left.set(key(fields.type), fields);
-      put(this.left.get(key(type.value)) ?? this.retyped(fields, type.value));
+      put(this.left.get(key(type.value)) ?? this.fresh(type.value));
     });
     const undo = this.button("As in the file", () => put(copy(this.own.materials[name])), "undo");
     return this.entry(name, fields.type, name, open, element("label", { className: "row" }, element("span", { textContent: "type" }), type),
       ...this.controls(fields, MATERIALS), undo);
   }
 
-  // A material of another type, with the fields that both have.
-  retyped(fields, type) {
-    const black = (value) => Array.isArray(value) && value.every((x) => x === 0); // as a mirror none would be seen
-    const kept = Object.entries(MATERIALS[type]).map(([name, [, usual]]) =>
-      [name, fields[name] === undefined || black(fields[name]) ? usual : fields[name]]);
-    return { type, ...Object.fromEntries(kept.filter(([, value]) => value !== null)) };
+  // A new material of a type.
+  fresh(type) {
+    const fields = Object.entries(MATERIALS[type]).map(([name, [, usual]]) => [name, copy(usual)]);
+    return { type, ...Object.fromEntries(fields.filter(([, value]) => value !== null)) };
   }
 
   light(fields, i, open = false) {

@@ -14,7 +14,11 @@ export const pickerColor = (rgb) => `#${rgb.map((x) => hex(x / Math.max(1, ...rg
 export const pickedColor = (color, before) =>
   [1, 3, 5].map((i) => rounded(linear(parseInt(color.slice(i, i + 2), 16) / 255) * Math.max(1, ...before)));
 
-const finite = (input) => (input.value !== "" && Number.isFinite(input.valueAsNumber) ? input.valueAsNumber : null);
+// What is wrong with a number that was entered, "" for nothing.
+function faultOf(input) {
+  if (input.value === "" || !Number.isFinite(input.valueAsNumber)) return "Expected a number";
+  return input.checkValidity() ? "" : `Expected at least ${input.min}`;
+}
 
 function numberInput(value, label, least) {
   const input = element("input", { type: "number", step: "any", defaultValue: value, ariaLabel: label });
@@ -22,18 +26,40 @@ function numberInput(value, label, least) {
   return input;
 }
 
+// The line that says what is wrong with some inputs. `taken()` is called when all are right, or returns what is wrong
+// with them together; an input that is left with a fault gets its last right value again.
+function guard(inputs, taken) {
+  const line = element("output", { className: "fault", hidden: true });
+  line.setAttribute("role", "alert");
+  let right = inputs.map((input) => input.value);
+  const check = () => {
+    const faults = inputs.map(faultOf);
+    inputs.forEach((input, i) => input.setAttribute("aria-invalid", String(faults[i] !== "")));
+    const fault = faults.find((text) => text) ?? taken() ?? "";
+    Object.assign(line, { value: fault, hidden: !fault });
+    if (!fault) right = inputs.map((input) => input.value);
+  };
+  const restore = () => {
+    if (line.hidden) return;
+    inputs.forEach((input, i) => (input.value = right[i]));
+    check();
+  };
+  for (const input of inputs) {
+    input.addEventListener("input", check);
+    input.addEventListener("change", restore);
+  }
+  return { line, keep: () => (right = inputs.map((input) => input.value)) };
+}
+
 // A number `value` of at least `least`; `changed(value)` is called with what the user enters, if it is one.
 export function numberField(name, value, least, changed) {
   const input = numberInput(value, name, least);
-  input.addEventListener("input", () => {
-    const entered = finite(input);
-    if (entered !== null && input.checkValidity()) changed(entered);
-  });
-  return element("label", { className: "row" }, element("span", { textContent: name }), input);
+  const { line } = guard([input], () => void changed(input.valueAsNumber));
+  return element("div", {}, element("label", { className: "row" }, element("span", { textContent: name }), input), line);
 }
 
-// Three numbers, and for a colour a picker too.
-export function vectorField(name, value, isColor, changed) {
+// Three numbers, and for a colour a picker too; a direction has a length.
+export function vectorField(name, value, { isColor, isDirection }, changed) {
   const axes = isColor ? ["red", "green", "blue"] : ["x", "y", "z"];
   const inputs = value.map((x, i) => numberInput(x, `${name}, ${axes[i]}`, isColor ? 0 : undefined));
   let current = value;
@@ -42,17 +68,17 @@ export function vectorField(name, value, isColor, changed) {
     changed(next);
   };
   const picker = isColor && element("input", { type: "color", defaultValue: pickerColor(value), ariaLabel: name });
-  for (const input of inputs)
-    input.addEventListener("input", () => {
-      const entered = inputs.map(finite);
-      if (entered.includes(null) || !inputs.every((one) => one.checkValidity())) return;
-      if (picker) picker.value = pickerColor(entered);
-      take(entered);
-    });
+  const { line, keep } = guard(inputs, () => {
+    const entered = inputs.map((input) => input.valueAsNumber);
+    if (isDirection && entered.every((x) => x === 0)) return "Expected a direction, not 0 0 0";
+    if (picker) picker.value = pickerColor(entered);
+    take(entered);
+  });
   picker?.addEventListener?.("input", () => {
     const picked = pickedColor(picker.value, current);
     inputs.forEach((input, i) => (input.value = picked[i]));
+    keep();
     take(picked);
   });
-  return element("div", { className: "vector" }, element("span", { textContent: name }), ...(picker ? [picker] : []), ...inputs);
+  return element("div", { className: "vector" }, element("span", { textContent: name }), ...(picker ? [picker] : []), ...inputs, line);
 }

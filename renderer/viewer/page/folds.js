@@ -3,6 +3,8 @@
 const KEY = "octree-render-folds";
 // On windows less wide than this the picture has the room, until the panel is opened.
 const NARROW = "(max-width: 1099px)";
+// The parts that are open at the first visit.
+const FIRST = ["fold-scene", "fold-readings"];
 
 // Some frames and private windows keep nothing.
 function kept() {
@@ -17,7 +19,7 @@ export class Folds {
   constructor(panel, toggle) {
     Object.assign(this, { panel, toggle, state: kept() });
     for (const fold of panel.querySelectorAll("details.fold")) {
-      fold.open = this.state[fold.id] === true;
+      fold.open = this.state[fold.id] ?? FIRST.includes(fold.id);
       fold.addEventListener("toggle", () => this.keep(fold.id, fold.open));
     }
     this.show(this.state.panel ?? !matchMedia(NARROW).matches);

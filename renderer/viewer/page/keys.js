@@ -4,6 +4,8 @@ import { isForStage, isShortcut } from "./controls.js";
 
 const MODES = ["gl", "phong", "brute", "octree", "proof"];
 
+const HISTORY = { z: "undo", y: "redo", Z: "redo" };
+
 export function bindKeys(viewer) {
   const { stage, panel } = viewer;
   const { fields } = panel;
@@ -30,7 +32,15 @@ export function bindKeys(viewer) {
   };
   MODES.forEach((mode, i) => (commands[i + 1] = () => viewer.setMode(mode)));
   document.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || document.querySelector("dialog[open]")) return;
+    if (event.altKey || document.querySelector("dialog[open]")) return;
+    if (event.ctrlKey || event.metaKey) {
+      const act = HISTORY[event.key];
+      // A field that is typed in has an undo of its own.
+      if (!act || event.target.matches("input[type=number]")) return;
+      event.preventDefault();
+      viewer.past[act]();
+      return;
+    }
     const own = isForStage(event, stage) || isShortcut(event) || event.key === "Escape";
     const command = commands[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (!own || !command) return;

@@ -19,6 +19,7 @@ import { fetchBoxes } from "./nodes.js";
 import { Objects } from "./objects.js";
 import { NO_BOXES } from "./overlay.js";
 import { Panel } from "./panel.js";
+import { Past } from "./past.js";
 import { Picture } from "./picture.js";
 import { Progress } from "./progress.js";
 import { Proof } from "./proof.js";
@@ -40,9 +41,6 @@ const REST = 150;
 // So long what was drawn last stays while its successor is on its way: drawing the model in between, only to draw again
 // at once, would take where there is no graphics processor longer than all the rest.
 const HOLD = 50;
-// Milliseconds after which a view is written into the address: browsers refuse more than some writes a second.
-const WRITE = 400;
-
 const TOO_LARGE = "What this page sends of the change is too large for the server; it is shown once it is smaller.";
 
 const find = (selector) => document.querySelector(selector);
@@ -70,6 +68,7 @@ class Viewer {
     this.changes = new Changes(find("#changes"));
     this.hint = new Hint(find("#hint"));
     this.sharing = new Sharing(this, find("#share"));
+    this.past = new Past(() => this.address, find("#undo"), find("#redo"));
     try {
       this.layer = new GlLayer(find("#gl"), () => this.lostGl());
     } catch (error) {
@@ -88,7 +87,11 @@ class Viewer {
     this.connection.open();
     addEventListener("pagehide", () => this.scene && remember({ ...this.kept, hash: location.hash }));
     // The address in the bar may be the page's own again by now.
-    addEventListener("hashchange", ({ newURL }) => this.scene && this.goTo(read(new URL(newURL).hash)));
+    addEventListener("hashchange", ({ newURL }) => {
+      if (!this.scene) return;
+      this.past.arrive();
+      this.goTo(read(new URL(newURL).hash));
+    });
     // A page that is loaded again goes on from where it was; another address says where to begin.
     const before = remembered();
     const [{ type }] = performance.getEntriesByType("navigation");
@@ -180,17 +183,10 @@ class Viewer {
     return mode !== undefined && !find(`[name=mode][value=${mode}]`).disabled;
   }
 
-  // Have the view written into the address soon.
-  keepAddress() {
-    this.writing ??= setTimeout(() => this.writeAddress(), WRITE);
-  }
-
-  // Write the view into the address.
-  writeAddress() {
-    this.writing = null;
+  // The address of the view.
+  get address() {
     const { scene, mode, camera, panel, objects } = this;
-    const hash = written({ file: scene.name, mode, state: camera.state, chosen: panel.chosen, hidden: objects.hidden });
-    if (hash !== location.hash) history.replaceState(history.state, "", location.pathname + location.search + hash);
+    return written({ file: scene.name, mode, state: camera.state, chosen: panel.chosen, hidden: objects.hidden });
   }
 
   hide(hidden) {
@@ -343,7 +339,7 @@ class Viewer {
     find("#hud").textContent = "";
     this.dirty = true;
     this.movedAt = 0;
-    this.keepAddress();
+    this.past.keep();
     this.request();
   }
 
@@ -365,7 +361,7 @@ class Viewer {
     this.dirty = true;
     this.movedAt = now;
     this.panel.showCamera(this.camera);
-    this.keepAddress();
+    this.past.keep();
     this.request();
   }
 
@@ -617,6 +613,9 @@ class Viewer {
 
   pickAt(clientX, clientY) {
     const asked = this.rays.pixel(this.view(), clientX, clientY);
+    // A card over the picture stands on the other side of it.
+    const { left, width } = find("#frame").getBoundingClientRect();
+    find("main").classList.toggle("aside-left", clientX > left + width / 2);
     if (asked) this.connection.send(this.rays.ask(asked, this.panel.settings, this.proofOf(asked)));
   }
 
@@ -642,9 +641,11 @@ class Viewer {
   // The part of the picture beside the card, as `Camera.seeAside` takes it.
   get free() {
     const [frame, card] = ["#frame", "#card"].map((name) => find(name).getBoundingClientRect());
-    const beside = card.top < frame.bottom && card.right < frame.right; // on phones it stands below
-    const hidden = beside ? Math.max(card.right - frame.left, 0) : 0;
-    return { x: hidden / 2 / frame.height, width: (frame.width - hidden) / frame.height };
+    const [left, right] = [Math.max(card.left, frame.left), Math.min(card.right, frame.right)];
+    const over = card.top < frame.bottom && card.bottom > frame.top ? Math.max(right - left, 0) : 0;
+    const hidden = over && over + Math.min(left - frame.left, frame.right - right); // with the gap at its side
+    const side = left - frame.left < frame.right - right ? 1 : -1;
+    return { x: (side * hidden) / 2 / frame.height, width: (frame.width - hidden) / frame.height };
   }
 
   // Turn about what was clicked last, once it is known what that is.

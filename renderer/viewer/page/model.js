@@ -2,7 +2,7 @@
 import { program } from "./program.js";
 
 const MAGIC = 0x4853454d;
-const MAX_LIGHTS = 8;
+export const MAX_LIGHTS = 8;
 // Texels a material: diffuse and shininess, specular and kind, reflectance, transmittance.
 const TEXELS = 4;
 const KINDS = { phong: 0, mirror: 1, dielectric: 2 };

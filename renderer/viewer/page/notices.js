@@ -13,7 +13,9 @@ export class Notices {
   say(text, name) {
     if (name && this.list.querySelector(`[data-name="${name}"]`)) return;
     for (const old of [...this.list.children]) if (!name && !old.dataset.name && old.textContent === text) old.remove();
-    const notice = element("p", { textContent: text });
+    const notice = element("p", { textContent: text, title: text });
+    // Its first lines, and all of it after a click.
+    notice.addEventListener("click", () => notice.classList.toggle("whole"));
     if (name) notice.dataset.name = name;
     else setTimeout(() => notice.remove(), SHOWN);
     this.list.append(notice);

@@ -29,11 +29,12 @@ export class Panel {
       changed("edits");
     } });
     this.form.addEventListener("submit", (event) => event.preventDefault());
-    this.form.addEventListener("input", ({ target }) => {
+    const moved = ({ target }) => {
       if (target.name === "azimuth" || target.name === "elevation") return this.edits.turnSun(this.sliders);
       this.showValues();
       changed(target.name);
-    });
+    };
+    for (const part of [this.form, find("#bar")]) part.addEventListener("input", moved);
   }
 
   // Fill everything in from the server's /scene.
@@ -209,7 +210,7 @@ export class Panel {
     const traced = mode === "octree" || mode === "brute" || mode === "proof";
     document.querySelector("#traced").disabled = !traced;
     this.fields.samples.disabled = this.fields.refine.disabled = mode !== "octree"; // others have their own numbers
-    this.fields.aov.disabled = mode === "proof"; // which compares colours
+    this.fields.aov.disabled = !traced || mode === "proof"; // which compares colours
     document.querySelector("#traced-note").hidden = traced;
   }
 }

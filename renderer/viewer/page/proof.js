@@ -26,6 +26,7 @@ export class Proof {
     this.pair = bar.querySelector("[name=pair]");
     this.verdict = bar.querySelector("output");
     this.names = frame.querySelectorAll(".way");
+    this.none = frame.querySelector("#no-difference");
     this.pair.addEventListener("change", () => asked());
     bar.addEventListener("change", ({ target }) => target.name === "proof-as" && this.show());
     divider.addEventListener("pointerdown", (event) => divider.setPointerCapture(event.pointerId));
@@ -109,6 +110,7 @@ export class Proof {
     this.divider.style.left = `${100 * this.split}%`;
     this.divider.setAttribute("aria-valuenow", Math.round(100 * this.split));
     for (const label of this.names) label.hidden = !split;
+    this.none.hidden = !this.differences || this.told?.identical !== this.told?.pixels;
     this.changed();
   }
 }

@@ -23,8 +23,9 @@ from renderer.scene.sky import Sky
 
 mi.set_variant("scalar_rgb")
 
-# So many that linear interpolation between them errs by less than float32 rounds.
-_SKY_ROWS = 4096
+# So many that linear interpolation between them errs by about 1e-7. An odd number: one row is the horizon, where the
+# gradient has its edge.
+_SKY_ROWS = 4097
 
 Rays = tuple[NDArray[np.float64], NDArray[np.float64]]
 Rgb = Sequence[float]
@@ -93,7 +94,7 @@ def background(scene: Scene) -> mi.Emitter:
 
 def _gradient(sky: Sky) -> NDArray[np.float64]:
     """A map of the sky by latitude, (rows, 4, 3), from straight up to straight down."""
-    sine = np.cos((np.arange(_SKY_ROWS) + 0.5) * (pi / _SKY_ROWS))[:, None, None]
+    sine = np.cos(np.linspace(0.0, pi, _SKY_ROWS))[:, None, None]
     ground = sky.horizon if sky.ground is None else sky.ground
     above = np.array(sky.horizon) + sine * (np.array(sky.zenith) - np.array(sky.horizon))
     return np.broadcast_to(np.where(sine > 0.0, above, ground), (_SKY_ROWS, 4, 3))
