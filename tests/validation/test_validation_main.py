@@ -18,8 +18,8 @@ from validation.defects.list import DEFECTS
 from validation.defects.record import gates, record
 from validation.gates import Gate
 from validation.job import Job
+from validation.report import chapters, schema
 from validation.report import page as report
-from validation.report import schema
 from validation.sections import NAMES, SECTIONS
 
 pytestmark = pytest.mark.judges(
@@ -66,9 +66,9 @@ def sections(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathF
     templates = tmp_path_factory.mktemp("templates")
     (templates / "plain.html").write_text("<p>a section</p>")
     monkeypatch.setattr(report, "_TEMPLATES", [report._TEMPLATES, templates])
-    plain = {name: partial._replace(template="plain.html") for name, partial in report.PARTIALS.items()}
-    monkeypatch.setattr(report, "PARTIALS", plain)
-    fakes = {name: Fake(name) for name in report.PARTIALS}
+    plain = {name: partial._replace(template="plain.html") for name, partial in chapters.PARTIALS.items()}
+    monkeypatch.setattr(chapters, "PARTIALS", plain)
+    fakes = {name: Fake(name) for name in plain}
     modules = {section.module: section.name for section in SECTIONS}
     monkeypatch.setattr(suite, "import_module", lambda name: fakes[modules[name]])
     monkeypatch.setattr(suite.judges, "check_names", lambda gates, left_out: ({"left_out": "no section is real"}, []))
@@ -100,7 +100,7 @@ def test_a_failing_gate_is_exit_code_1_and_named_everywhere(
     assert "FAILED hits: torus: leaks is 3, expected at most 0" in out
     assert "validation: FAIL, 1 of 2 gates" in out
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
-    assert "FAIL" in page and page.index("torus: leaks") < page.index('id="sections"')
+    assert "FAIL" in page and page.index("torus: leaks") < page.index('id="hits"')
     assert "a closed mesh has no holes" in (tmp_path / "junit.xml").read_text(encoding="utf-8")
 
 
@@ -234,7 +234,7 @@ class TestDefects:
     ) -> None:
         output = ["--output", str(tmp_path)]
         assert command.main(["--only", "hits", *output]) == 0
-        assert "No run is stored" in (tmp_path / "index.html").read_text(encoding="utf-8")
+        assert "no run is stored" in (tmp_path / "index.html").read_text(encoding="utf-8")
         names = ("hits: a: b",)
         answers += [Answer(names, red, None, 1.0) for red in ((), names)]
         assert command.main(["--defects", *output]) == 0

@@ -23,8 +23,8 @@ def _hits_figure(hits: Mapping[str, Any]) -> dict[str, str]:
     leaks = {p["name"]: (p["leaks"] or 0.5) / p["leak_rays"] for p in points}
     errors = {p["name"]: p["errors"]["p99"] for p in points}
     panels = [
-        Panel(contenders(points, errors, hits["fronts"]["p99"]), "p99 relative error of t"),
-        Panel(contenders(points, leaks, hits["fronts"]["leaks"]), "share that leaks"),
+        Panel(_contenders(points, errors, hits["fronts"]["p99"]), "p99 relative error of t"),
+        Panel(_contenders(points, leaks, hits["fronts"]["leaks"]), "share that leaks"),
     ]
     title = (
         f"Camera rays at the {hits['mesh']['name']} of {hits['mesh']['faces']:,} faces: speed against the 99th "
@@ -36,7 +36,7 @@ def _hits_figure(hits: Mapping[str, Any]) -> dict[str, str]:
     return {"title": title, "svg": shown}
 
 
-def contenders(
+def _contenders(
     points: Sequence[Mapping[str, Any]], errors: Mapping[str, float | None], names: Sequence[str]
 ) -> list[Series]:
     """A marker for each contender, and the front as a line through its markers."""
@@ -52,7 +52,7 @@ def _samples_figure(pictures: Mapping[str, Any]) -> dict[str, str]:
     for quantity, label in _QUANTITIES.items():
         best = [named[name] for name in pictures["fronts"][quantity]]
         series = [
-            _curve(f"{c['who']}, RMSE ~ N^{c['slope_value']['rmse']:.2f}", c, quantity, look)
+            curve(f"{c['who']}, RMSE ~ N^{c['slope_value']['rmse']:.2f}", c, quantity, look)
             for look, c in enumerate(curves)
         ]
         front = Series("Pareto front", [p["seconds"] for p in best], [p[quantity] for p in best], PLAIN)
@@ -71,7 +71,7 @@ def _truncation_figure(pictures: Mapping[str, Any]) -> dict[str, str]:
     curves = [c for c in pictures["curves"] if c["knob"] != "samples"]
     panels = [
         Panel(
-            [_curve(f"{c['who']}, {_PARAMETERS[c['knob']]}", c, quantity, look) for look, c in enumerate(curves)], label
+            [curve(f"{c['who']}, {_PARAMETERS[c['knob']]}", c, quantity, look) for look, c in enumerate(curves)], label
         )
         for quantity, label in _QUANTITIES.items()
     ]
@@ -83,7 +83,8 @@ def _truncation_figure(pictures: Mapping[str, Any]) -> dict[str, str]:
     return {"title": title, "svg": draw(panels, x_label="seconds", title="Pictures: truncation against run time")}
 
 
-def _curve(name: str, curve: Mapping[str, Any], quantity: str, look: int) -> Series:
-    points = curve["points"]
+def curve(name: str, record: Mapping[str, Any], quantity: str, look: int) -> Series:
+    """A quantity of one curve of the record against its seconds."""
+    points = record["points"]
     errors = [p[quantity] if p[quantity] > _ROUNDOFF else None for p in points]
     return Series(name, [p["seconds"] for p in points], errors, look)

@@ -15,18 +15,24 @@ def stability_figures(record: Mapping[str, Any]) -> list[dict[str, str]]:
 
 
 def _error_figure(name: str, sweep: Mapping[str, Any]) -> dict[str, str]:
+    wrong = Panel(_by_kernel(sweep, "wrong_share"), "wrong", share=True)
+    title = (
+        f"Error against {name}: the largest of {sweep['points'][0]['rays']} rays at each point, and the share of wrong "
+        f"answers (missed, falsely hit, or another face). An error of 0 is drawn at {FLOOR:.0e}."
+    )
+    shown = draw([error_panel(sweep), wrong], x_label=sweep["label"], title=f"Error of t against {name}")
+    return {"title": title, "svg": shown}
+
+
+def error_panel(sweep: Mapping[str, Any]) -> Panel:
+    """The largest error of t at each x of a sweep, a curve for each kernel."""
+    return Panel(_by_kernel(sweep, "relative_max"), "largest relative error of t", roundoffs=True)
+
+
+def _by_kernel(sweep: Mapping[str, Any], quantity: str) -> list[Series]:
     points = sweep["points"]
     x = [p["x"] for p in points]
-    wrong = [Series(shown, x, [p[kernel]["wrong_share"] for p in points]) for kernel, shown in _NAMES.items()]
-    panels = [
-        Panel(error_series(points), "largest relative error of t", roundoffs=True),
-        Panel(wrong, "wrong", share=True),
-    ]
-    title = (
-        f"Error against {name}: the largest of {points[0]['rays']} rays at each point, and the share of wrong answers "
-        f"(missed, falsely hit, or another face). An error of 0 is drawn at {FLOOR:.0e}."
-    )
-    return {"title": title, "svg": draw(panels, x_label=sweep["label"], title=f"Error of t against {name}")}
+    return [Series(shown, x, [p[kernel][quantity] for p in points]) for kernel, shown in _NAMES.items()]
 
 
 def _leak_figure(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
@@ -34,24 +40,18 @@ def _leak_figure(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
         f"Leaks from inside icospheres, {rows[0]['rays']:,} rays a mesh, half at edges and half at vertices. No leak "
         f"is drawn at {_half_a_ray(rows):.3g} a million, half a ray."
     )
-    svg = loglog(leak_series(rows), x_label="faces", y_label="leaks per million rays", title="Leaks against mesh size")
-    return {"title": title, "svg": svg}
+    return {"title": title, "svg": draw([leak_panel(rows)], x_label="faces", title="Leaks against mesh size")}
 
 
-def error_series(points: Sequence[Mapping[str, Any]]) -> list[Series]:
-    """The largest relative error of t of each contender."""
-    x = [p["x"] for p in points]
-    return [Series(shown, x, [p[kernel]["relative_max"] for p in points]) for kernel, shown in _NAMES.items()]
-
-
-def leak_series(rows: Sequence[Mapping[str, Any]]) -> list[Series]:
-    """Each contender's leaks per million rays by the mesh's faces."""
+def leak_panel(rows: Sequence[Mapping[str, Any]]) -> Panel:
+    """Leaks of spheres by their number of faces, a curve for each kernel."""
     x, floor = [row["faces"] for row in rows], _half_a_ray(rows)
-    return [Series(s, x, [1e6 * row[k] / row["rays"] or floor for row in rows]) for k, s in _NAMES.items()]
+    series = [Series(s, x, [1e6 * row[k] / row["rays"] or floor for row in rows]) for k, s in _NAMES.items()]
+    return Panel(series, "leaks per million rays")
 
 
 def _half_a_ray(rows: Sequence[Mapping[str, Any]]) -> float:
-    """What stands for no leak: half the resolution of this many rays, per million."""
+    """No leak is drawn as this many a million: half a ray, the resolution of this many rays."""
     return 0.5e6 / max(row["rays"] for row in rows)
 
 

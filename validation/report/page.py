@@ -4,42 +4,21 @@ import base64
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from validation.report import efficiency_figures, figures, headline
+from validation.report import chapters, efficiency_figures, figures, key_figures
 
 _TEMPLATES = Path(__file__).parent / "templates"
 
 # Functions for templates that draw curves from a record: figures with a title and an SVG, or the SVG alone.
 FIGURES: dict[str, Callable[..., Any]] = {
+    "key_figures": key_figures.figures,
     "stability_figures": figures.stability_figures,
-    "headline_figures": headline.figures,
     "efficiency_figures": efficiency_figures.figures,
     "monte_carlo_figure": figures.monte_carlo_figure,
     "studies_figures": figures.studies_figures,
-}
-
-
-class Partial(NamedTuple):
-    """A section of the page: its title, what it does in one line, and the template of its record m.<section>."""
-
-    title: str
-    line: str
-    template: str
-
-
-# The sections in the page's order.
-PARTIALS = {
-    "hits": Partial("Hits", "beside Embree, libigl, Mitsuba and trimesh, judged by exact arithmetic", "hits.html"),
-    "images": Partial("Pictures", "beside Mitsuba's, one effect of light at a time", "pictures.html"),
-    "queries": Partial("Queries", "inside, distance, all hits, and the drop-in for trimesh", "queries.html"),
-    "studies": Partial("Studies", "sky view factors, hours of sun, ambient occlusion", "studies.html"),
-    "stability": Partial("Stability", "extreme cases, watertightness, error of the hit distance", "stability.html"),
-    "random": Partial("Random input", "scenes and meshes drawn from a seed", "random.html"),
-    "promises": Partial("Promises", "rules of the documentation, each checked on its own", "promises.html"),
-    "efficiency": Partial("Efficiency", "error and run time beside other tracers; no gates", "efficiency.html"),
 }
 
 
@@ -53,8 +32,9 @@ def page(metrics: dict[str, Any], pictures: Path) -> str:
     environment.globals |= FIGURES
     environment.globals["shown"] = shown
     environment.globals["failed_files"] = failed_files
-    environment.globals["partials"] = PARTIALS
-    return environment.get_template("report.html").render(m=metrics)
+    environment.globals["partials"] = chapters.PARTIALS
+    shown_chapters, absent = chapters.present(metrics), chapters.absent(metrics)
+    return environment.get_template("report.html").render(m=metrics, chapters=shown_chapters, absent=absent)
 
 
 class PictureClasses:

@@ -34,8 +34,6 @@ _SVG = "http://www.w3.org/2000/svg"
 _HREF = "{http://www.w3.org/1999/xlink}href"
 _FONT = "DejaVu Sans"  # comes with matplotlib; text is laid out with it and shown in the page's own sans-serif
 _PIXELS = 100.0  # an inch
-_LEGEND = 8.0  # points
-_TWO_ROWS = 45.0  # pixels
 
 
 class Series(NamedTuple):
@@ -73,14 +71,15 @@ def loglog(series: Sequence[Series], *, x_label: str, y_label: str, title: str) 
     return draw([Panel(series, y_label)], x_label=x_label, title=title)
 
 
-def draw(panels: Sequence[Panel], *, x_label: str, title: str, width: int = 600) -> str:
-    """Panels below each other, the first one the largest, with one x axis and one legend, ``width`` pixels wide; see
-    ``loglog``.
+def draw(panels: Sequence[Panel], *, x_label: str, title: str, size: tuple[int, int] = (600, 360)) -> str:
+    """Panels below each other, with one x axis and one legend; the first one is the largest, of ``size`` pixels.
+
+    See ``loglog``.
     """
     bad = [x for panel in panels for s in panel.series for x in s.x if not 0.0 < x < math.inf]
     if bad:
         raise ValueError(f"series: expected positive, finite x for {title!r}, got {bad[0]}")
-    identity = hashlib.sha256(repr((panels, x_label, title)).encode()).hexdigest()[:10]
+    identity = hashlib.sha256(repr((panels, x_label, title, size)).encode()).hexdigest()[:10]
     settings: dict[Any, Any] = {
         "svg.hashsalt": identity, "svg.fonttype": "none", "font.family": _FONT, "font.size": 9.0,
         "axes.edgecolor": _GREY, "xtick.color": _GREY, "ytick.color": _GREY, "xtick.labelcolor": _INK,
@@ -88,7 +87,7 @@ def draw(panels: Sequence[Panel], *, x_label: str, title: str, width: int = 600)
         "axes.spines.top": False, "axes.spines.right": False,
     }  # fmt: skip
     with matplotlib.rc_context(settings):
-        height = 360.0 + 150.0 * (len(panels) - 1)
+        width, height = size[0], size[1] + 150 * (len(panels) - 1)
         figure = Figure(figsize=(width / _PIXELS, height / _PIXELS), dpi=_PIXELS, layout="constrained")
         figure.patch.set_visible(False)
         ratios = [2.4] + [1.0] * (len(panels) - 1)
@@ -111,14 +110,11 @@ def _add_legend(figure: Figure, handles: Mapping[str, Any]) -> None:
     renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
     for columns in range(len(handles) if len(handles) <= 4 else 3, 0, -1):
         legend = figure.legend(
-            handles.values(), handles.keys(), loc="outside upper center", ncols=columns, frameon=False, fontsize=_LEGEND
+            handles.values(), handles.keys(), loc="outside upper center", ncols=columns, frameon=False
         )
         if columns == 1 or legend.get_window_extent(renderer).width <= figure.bbox.width:
-            break
+            return
         legend.remove()
-    # The axes keep their height beside a legend of many rows.
-    more = max(0.0, legend.get_window_extent(renderer).height - _TWO_ROWS)
-    figure.set_figheight(figure.get_figheight() + more / _PIXELS)
 
 
 def _plot(panel: Panel, axes: Axes) -> None:

@@ -218,4 +218,4 @@ def _page(record: dict[str, Any]) -> str:
 
     environment = Environment(loader=FileSystemLoader(report._TEMPLATES), autoescape=True, undefined=StrictUndefined)
     environment.filters["number"] = report.number
-    return environment.get_template("hits.html").render(m={"hits": record})
+    return environment.get_template("hits.html").render(m={"hits": record}, row={"failed": 0})

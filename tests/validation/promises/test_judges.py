@@ -10,7 +10,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from validation.gates import Gate
 from validation.promises import judges, names, section
 from validation.promises.judges import check_names, marked
-from validation.report import page
+from validation.report import chapters, page
 from validation.studies import holds
 
 GATE = Gate("hits", "a sphere", "leaks", 0.0, "at most", 0.0, "it is closed")
@@ -59,7 +59,7 @@ def shown(found: dict[str, Any]) -> str:
     """The section of the report, without promises."""
     environment = Environment(loader=FileSystemLoader(page._TEMPLATES), undefined=StrictUndefined)
     environment.filters["number"] = page.number
-    environment.globals["partials"] = page.PARTIALS
+    environment.globals["partials"] = chapters.PARTIALS
     return environment.get_template("promises.html").render(m={"promises": {"rows": [], "names": found}})
 
 

@@ -1,8 +1,6 @@
 """The page: it stands alone, shows each picture once, and says what the metrics say; the schema of the metrics."""
 
 import re
-import struct
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -11,46 +9,6 @@ import pytest
 from validation.gates import Gate
 from validation.report import page as report
 from validation.report import schema, summary
-
-
-def png(path: Path, grey: int, width: int = 2, height: int = 1) -> None:
-    """A grey picture with the least that a PNG needs."""
-
-    def chunk(kind: bytes, body: bytes) -> bytes:
-        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
-
-    rows = (b"\x00" + bytes([grey]) * width) * height
-    header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
-    chunks = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunks)
-
-
-@pytest.fixture
-def metrics(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """Of a run of the pictures alone, one gate of which fails; its partial shows the same pictures twice."""
-    triple = '{{ triple({"ours": "a.png", "reference": "b.png", "difference": "c.png"}, "a scene") }}'
-    (tmp_path / "plain.html").write_text('{% from "macros.html" import triple %}' + triple * 2)
-    monkeypatch.setattr(report, "_TEMPLATES", [report._TEMPLATES, tmp_path])
-    plain = report.PARTIALS["images"]._replace(template="plain.html")
-    monkeypatch.setattr(report, "PARTIALS", report.PARTIALS | {"images": plain})
-    for name, grey in (("a.png", 10), ("b.png", 20), ("c.png", 10)):
-        png(tmp_path / name, grey)
-    gates = [
-        Gate("images", "glass", "ssim", 0.5, "at least", 0.998, "structure").record(),
-        Gate("images", "stairs", "ssim", 0.9999, "at least", 0.998, "structure").record(),
-    ]
-    failed = {"subject": "glass", "failed": {"ours": "failed/glass-ours.exr"}}
-    record = {"seconds": 2.0, "costs": {"Mitsuba <3>": 1.5}, "scenes": [failed]}
-    rows = summary.matrix({"images": record}, gates)
-    return {
-        "schema": 3, "command": "python -m validation --only images", "quick": False, "own": True,
-        "started": "2026-01-01T10:00:00+00:00", "seconds": 3.0, "verdict": summary.verdict(gates), "matrix": rows,
-        "facts": summary.facts({"images": record}, gates, None), "thresholds": {"file": None, "moved": {}},
-        "gates": gates,
-        "left_out": {"hits": "not named by --only"}, "baseline": {"absent": "There is none."}, "images": record,
-        "environment": {"python": "3.11", "processor": "one", "threads": 2, "platform": "p", "packages": {"numpy": "2"},
-                        "sources": "0" * 64},
-    }  # fmt: skip
 
 
 def test_the_page_stands_alone_and_holds_each_picture_once(metrics: dict[str, Any], tmp_path: Path) -> None:
@@ -65,29 +23,11 @@ def test_the_page_stands_alone_and_holds_each_picture_once(metrics: dict[str, An
     assert anchors <= set(re.findall(r'id="([^"]+)"', page))
 
 
-def test_the_verdict_comes_first_and_names_what_fails(metrics: dict[str, Any], tmp_path: Path) -> None:
+def test_a_failing_gate_has_its_files_and_names_are_escaped(metrics: dict[str, Any], tmp_path: Path) -> None:
     page = report.page(metrics, tmp_path)
     assert "1 of 2 gates hold" in page
-    top = page[: page.index('id="sections"')]
-    assert "glass: ssim" in top and "stairs" not in top
-    assert 'href="pictures/failed/glass-ours.exr"' in top
-    assert page.index("<details") > page.index('id="sections"')
-    # The section that fails is open, and no other.
-    assert page.count('" open>') == 1 and 'id="section-images" open>' in page
-    names = (
-        "verdict",
-        "sections",
-        "section-images",
-        "checks",
-        "defects",
-        "appendix",
-        "gates",
-        "references",
-        "versions",
-    )
-    order = [page.index(f'id="{name}"') for name in names]
-    assert order == sorted(order)
-    assert "Mitsuba &lt;3&gt;" in page and "not named by --only" in page and "There is none." in page
+    assert 'href="pictures/failed/glass-ours.exr"' in page[: page.index("<section")]
+    assert "Mitsuba &lt;3&gt;" in page and "There is none." in page
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from cases import cases
 from renderer import Octree
 from renderer.studies.points import Chosen, Points
 from validation.job import Job
-from validation.report import figures, page
+from validation.report import chapters, figures
 from validation.studies import bits, bodies, corners, forms, holds, section
 from validation.thresholds import Thresholds
 
@@ -33,7 +33,7 @@ def test_all_gates_pass_and_the_record_draws_a_figure(run):
     assert (folder / section.PICTURE).stat().st_size > 10_000
     (figure,) = figures.studies_figures(record)
     assert "N^-0.7" in figure["svg"] and "random, N^-0.50" in figure["svg"]
-    assert page.PARTIALS["studies"].template == "studies.html"
+    assert chapters.PARTIALS["studies"].template == "studies.html"
 
 
 @pytest.mark.parametrize("name", ["sky_view_factor", "ambient_occlusion", "openness"])
