@@ -107,7 +107,8 @@ def unpack_samples(app, failed):
     for path in sorted((HERE / "samples").glob("*.html.gz")):
         page = Path(app.outdir, "samples", path.stem)
         page.parent.mkdir(exist_ok=True)
-        page.write_bytes(gzip.decompress(path.read_bytes()).replace(b"<body>", b"<body>" + BACK, 1))
+        back = b"" if path.name.startswith("model") else BACK  # which the start page shows within itself
+        page.write_bytes(gzip.decompress(path.read_bytes()).replace(b"<body>", b"<body>" + back, 1))
 
 
 def setup(app):
