@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 
 import numpy as np
@@ -14,6 +15,7 @@ from renderer.errors import expect
 from renderer.inside.crossings import ON_FACE, UNDECIDED_COUNT, count_crossings
 from renderer.inside.rational import crossings_of
 from renderer.inside.winding import exceeds_half
+from renderer.mesh.mending import cancels
 from renderer.mesh.mesh import Mesh
 from renderer.ordering.cells import search_in_order
 from renderer.trace.layout import Tree
@@ -32,7 +34,9 @@ def contains(
     expect(isinstance(rule, str) and rule in RULES, "rule", f"one of {RULES}", repr(rule))
     expect(not winding or rule == RULES[0], "rule", f"the default with winding=True, {RULES[0]!r}", repr(rule))
     expect(len(mesh.faces) > 0, "mesh", "faces", "none")
-    if not winding:
+    if winding:
+        _warn_of_inside_out(mesh)
+    else:
         _check_closed(mesh, rule)
     rows, shape = check_points("points", points)
     counted = _counted(tree, mesh, rows, threads)
@@ -48,6 +52,11 @@ def contains(
 
 def _check_closed(mesh: Mesh, rule: str) -> None:
     """Raise ``ValueError`` for a mesh that has no inside."""
+    if rule == "nonzero" and cancels(mesh.vertices, mesh.faces):
+        expected = (
+            "a closed mesh whose faces are turned one way, or rule='even-odd'; Mesh.without_duplicates() mends it"
+        )
+        expect(False, "mesh", expected, f"{len(mesh.faces)} faces, each as often one way round as the other")
     edges = mesh.open_edges if rule == "nonzero" else mesh.odd_edges
     if len(edges):
         start, end = mesh.vertices[edges[0]].tolist()
@@ -55,6 +64,16 @@ def _check_closed(mesh: Mesh, rule: str) -> None:
         if rule == "nonzero":
             expected = "a closed mesh whose faces are turned one way, or rule='even-odd' or winding=True"
         expect(False, "mesh", expected, f"{len(edges)} open edges, the first from {start} to {end}")
+
+
+def _warn_of_inside_out(mesh: Mesh) -> None:
+    """Warn where the mesh encloses a negative volume, seen from the middle of its box."""
+    lower, upper = mesh.bounds
+    size = float((upper / 2 - lower / 2).max()) or 1.0
+    corners = (mesh.triangles - (lower / 2 + upper / 2)) / size
+    if float(np.einsum("ni,ni->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum()) < 0.0:
+        text = "the mesh is turned inside out, so that no point is inside: its faces are clockwise seen from outside"
+        warnings.warn(text, UserWarning, stacklevel=4)
 
 
 def _counted(tree: Tree, mesh: Mesh, points: NDArray[np.float64], threads: int) -> NDArray[np.int32]:

@@ -160,7 +160,7 @@ def parse_mesh(content: bytes, suffix: str, reading: Reading | None = None, fold
     # Some editors begin a text with a byte order mark, which is no part of it. In STL only its length tells what it is.
     if suffix != ".stl":
         content = content.removeprefix(BOM_UTF8)
-    mesh = parse_gltf(content, reading, folder) if suffix in _GLTF else _PARSERS[suffix](content, reading)
+    mesh = parse_gltf(content, reading, folder) if suffix in Y_UP else _PARSERS[suffix](content, reading)
     if len(mesh.faces) == 0:
         said = "; ".join(str(one) for one in (reading.total, *reading.notes) if one)
         raise MeshError(f"holds no good faces: {said}" if said else "holds no faces")
@@ -173,7 +173,8 @@ def save_ply(mesh: Mesh, path: str | os.PathLike[str]) -> None:
 
 
 _PARSERS: dict[str, Callable[[bytes, Reading], Mesh]] = {".ply": parse_ply, ".obj": parse_obj, ".stl": parse_stl}
-_GLTF = (".glb", ".gltf")
+# Of glTF, in which y points up by its specification.
+Y_UP = (".glb", ".gltf")
 
 # The suffixes of files that ``load_mesh`` reads.
-MESH_SUFFIXES = (*_PARSERS, *_GLTF)
+MESH_SUFFIXES = (*_PARSERS, *Y_UP)

@@ -28,6 +28,7 @@ _KEYWORDS = {"f4": "float", "f8": "double", "u1": "uchar"}  # of what is written
 _ByteOrder = Literal["<", ">", "="]
 _ASCII: _ByteOrder = "="  # its numbers are turned into native doubles
 _BYTE_ORDERS: dict[str, _ByteOrder] = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": _ASCII}
+_XYZ, _NORMAL = ("x", "y", "z"), ("nx", "ny", "nz")
 _INDEX_NAMES = ("vertex_indices", "vertex_index")
 _KEPT = {"x", "y", "z", "nx", "ny", "nz", "red", "green", "blue", "s", "t", "u", "v", "texture_u", "texture_v"}
 _TEXCOORD_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
@@ -77,16 +78,10 @@ def parse_ply(content: bytes, reading: Reading | None = None) -> Mesh:
     Raises ``MeshError``, which does not know the file's name.
     """
     reading = reading or Reading()
-    byte_order, elements, body_start = _parse_header(content, reading)
-    if byte_order == _ASCII:
-        content, elements = _ascii_as_doubles(content[body_start:]), [_in_doubles(e) for e in elements]
-        body_start = 0
-    columns = _read_elements(content, body_start, elements, byte_order, reading)
+    columns, elements = _vertices(content, reading)
     _note_left_out(elements, reading)
-    if "vertex" not in columns:
-        raise MeshError(f"expected an element 'vertex', got {', '.join(columns) or 'no element'}")
     vertex = columns["vertex"]
-    positions = _vertex_columns(vertex, ("x", "y", "z"))
+    positions = _vertex_columns(vertex, _XYZ)
     if positions is None:
         raise MeshError(f"element vertex: expected properties x, y and z, got {', '.join(vertex) or 'none'}")
     lists = [(e.name, _corners(e.name, columns[e.name])) for e in elements if e.name in ("face", "tristrips")]
@@ -97,10 +92,22 @@ def parse_ply(content: bytes, reading: Reading | None = None) -> Mesh:
     return reading.mesh(
         positions,
         np.concatenate([np.empty((0, 3), np.int64), *faces]),
-        normals=_vertex_columns(vertex, ("nx", "ny", "nz")),
+        normals=_vertex_columns(vertex, _NORMAL),
         colors=_colors(vertex, reading),
         texcoords=next((pair for pair in texcoords if pair is not None), None),
     )
+
+
+def _vertices(content: bytes, reading: Reading) -> tuple[dict[str, _Columns], list[_Element]]:
+    """The columns of a file's elements, vertices among them, and the elements."""
+    byte_order, elements, body_start = _parse_header(content, reading)
+    if byte_order == _ASCII:
+        content, elements = _ascii_as_doubles(content[body_start:]), [_in_doubles(e) for e in elements]
+        body_start = 0
+    columns = _read_elements(content, body_start, elements, byte_order, reading)
+    if "vertex" not in columns:
+        raise MeshError(f"expected an element 'vertex', got {', '.join(columns) or 'no element'}")
+    return columns, elements
 
 
 def _note_left_out(elements: list[_Element], reading: Reading) -> None:
@@ -112,6 +119,15 @@ def _note_left_out(elements: list[_Element], reading: Reading) -> None:
             reading.note(f"left out: element {element.name}")
         elif names and element.count:
             reading.note(f"left out of element {element.name}:", names)
+
+
+def point_rows(content: bytes) -> NDArray[np.float64]:
+    """The vertices of a file, (n, 3), or (n, 6) with normals; it needs no faces. Raises ``MeshError``."""
+    vertex = _vertices(content, Reading())[0]["vertex"]
+    positions, normals = (_vertex_columns(vertex, names) for names in (_XYZ, _NORMAL))
+    if positions is None:
+        raise MeshError(f"element vertex: expected properties x, y and z, got {', '.join(vertex) or 'none'}")
+    return positions if normals is None else np.concatenate([positions, normals], axis=1)
 
 
 def format_ply(mesh: Mesh) -> bytes:

@@ -23,7 +23,9 @@ V = "".join("v {} {} {}\n".format(*corner) for corner in CORNERS)
 F = "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in FACES)
 OBJ = {
     "an unknown statement": (f"call x\n{V}vw 1\n{F}", "left out: unknown statements call, vw"),
-    "free-form curves": (f"{V}{F}cstype bezier\ndeg 3\ncurv 0 1 1 2 3 4\nend\n", "left out: free-form curves and surfaces"),
+    "free-form curves": (
+        f"{V}{F}cstype bezier\ndeg 3\ncurv 0 1 1 2 3 4\nend\n", "left out: free-form curves and surfaces",
+    ),
     "materials": (f"mtllib a.mtl\n{V}usemtl red\n{F}", "left out: materials"),
     "a face of two corners": (f"{V}f 1 2\n{F}f 3\n", "left out: faces of fewer than three corners"),
     "a normal that is not there": (V + F.replace("f 1 ", "f 1//7 "), "left out: normal indices that name nothing"),
@@ -54,14 +56,17 @@ PLY = {
         PLAIN.replace("face 12", "face 15").replace(LISTS, "0\n" + LISTS + "1 0\n2 0 1\n"),
         "left out: faces of fewer than three corners",
     ),
-    "a header line": (PLAIN.replace("element v", "Created by x\nelement v"), "left out: header lines that begin with Created"),
+    "a header line": (
+        PLAIN.replace("element v", "Created by x\nelement v"), "left out: header lines that begin with Created",
+    ),
     "version 1.00": (PLAIN.replace("1.0", "1.00"), None),
     "face colours": (
         PLAIN.replace("end_h", "property uchar red\nend_h").replace(LISTS, LISTS.replace("\n", " 9\n")),
         "left out of element face: red",
     ),
     "corners' texture coordinates": (
-        PLAIN.replace("end_h", "property list uchar float texcoord\nend_h").replace(LISTS, LISTS.replace("\n", " 6 0 0 1 0 1 1\n")),
+        PLAIN.replace("end_h", "property list uchar float texcoord\nend_h")
+        .replace(LISTS, LISTS.replace("\n", " 6 0 0 1 0 1 1\n")),
         "left out of element face: texcoord",
     ),
     "another element": (
@@ -77,7 +82,9 @@ STL = {
     "end solid": (f"solid x\n{FACETS}end solid x\n", None),
     "no endsolid": (f"solid x\n{FACETS}", "1 solids begin, 0 end"),
     "no normal": (f"solid x\n{FACETS.replace(' normal 0 0 1', ' ')}endsolid\n", "facets without a normal"),
-    "two bytes behind": (b" " * 80 + struct.pack("<I", 12) + RECORDS + b"\0\0", "left out: what stands behind the last face"),
+    "two bytes behind": (
+        b" " * 80 + struct.pack("<I", 12) + RECORDS + b"\0\0", "left out: what stands behind the last face",
+    ),
     "a count of 0": (b" " * 80 + struct.pack("<I", 0) + RECORDS, "the header counts 0 faces, the file holds 12"),
     "no count": (b" " * 80 + b"\xff" * 4 + RECORDS, "the header counts 4294967295 faces, the file holds 12"),
     "solid in a binary header": (b"solid x".ljust(80) + struct.pack("<I", 12) + RECORDS, None),
