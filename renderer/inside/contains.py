@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 
 import numpy as np
@@ -34,9 +33,7 @@ def contains(
     expect(isinstance(rule, str) and rule in RULES, "rule", f"one of {RULES}", repr(rule))
     expect(not winding or rule == RULES[0], "rule", f"the default with winding=True, {RULES[0]!r}", repr(rule))
     expect(len(mesh.faces) > 0, "mesh", "faces", "none")
-    if winding:
-        _warn_of_inside_out(mesh)
-    else:
+    if not winding:
         _check_closed(mesh, rule)
     rows, shape = check_points("points", points)
     counted = _counted(tree, mesh, rows, threads)
@@ -66,14 +63,12 @@ def _check_closed(mesh: Mesh, rule: str) -> None:
         expect(False, "mesh", expected, f"{len(edges)} open edges, the first from {start} to {end}")
 
 
-def _warn_of_inside_out(mesh: Mesh) -> None:
-    """Warn where the mesh encloses a negative volume, seen from the middle of its box."""
+def is_inside_out(mesh: Mesh) -> bool:
+    """Whether the mesh, which may have holes, encloses less than nothing, by more than a hundredth of its box."""
     lower, upper = mesh.bounds
-    size = float((upper / 2 - lower / 2).max()) or 1.0
-    corners = (mesh.triangles - (lower / 2 + upper / 2)) / size
-    if float(np.einsum("ni,ni->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum()) < 0.0:
-        text = "the mesh is turned inside out, so that no point is inside: its faces are clockwise seen from outside"
-        warnings.warn(text, UserWarning, stacklevel=4)
+    sides = np.where(upper > lower, upper / 2 - lower / 2, 1.0)
+    a, b, c = np.moveaxis((mesh.triangles - (lower / 2 + upper / 2)) / sides, 1, 0)  # within a box from -1 to 1
+    return float(np.einsum("ni,ni->n", a, np.cross(b, c)).sum()) / 6.0 < -0.08
 
 
 def _counted(tree: Tree, mesh: Mesh, points: NDArray[np.float64], threads: int) -> NDArray[np.int32]:

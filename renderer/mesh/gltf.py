@@ -29,7 +29,15 @@ _JSON, _BINARY = b"JSON", b"BIN\0"
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 # What a file may require: what is read here, and the beginnings of names of extensions that move no vertex.
 _READ = ("KHR_mesh_quantization", "EXT_mesh_gpu_instancing")
-_HARMLESS = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_", "KHR_animation_", "KHR_xmp")
+_HARMLESS = (
+    "KHR_materials_",
+    "KHR_technique",
+    "KHR_texture_",
+    "KHR_lights_",
+    "EXT_texture_",
+    "KHR_animation_",
+    "KHR_xmp",
+)
 _INSTANCING = "EXT_mesh_gpu_instancing"
 # What of a document has no place in a mesh.
 _LEFT_OUT = ("materials", "textures", "animations", "cameras")
@@ -100,6 +108,9 @@ def _chunks(content: bytes, length: int) -> Iterator[tuple[bytes, bytes]]:
 
 def _refuse_unread(document: dict[str, Any]) -> None:
     """Raise ``MeshError`` for a file that needs what is not read here."""
+    version = str((document.get("asset") or {}).get("version", "2.0"))
+    if isinstance(document.get("meshes"), dict) or version.startswith("1"):
+        raise MeshError(f"glTF: expected version 2.0, got version {version if version[:1] == '1' else '1.0'}")
     for extension in document.get("extensionsRequired") or []:
         if extension not in _READ and not str(extension).startswith(_HARMLESS):
             raise MeshError(f"glTF: needs the extension {extension}, which is not read")

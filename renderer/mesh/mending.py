@@ -87,6 +87,8 @@ def twins(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Twins:
 
 def cancels(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> bool:
     """Whether each face is there as often one way round as the other, so that together they bound nothing."""
-    number, alike = twins(vertices, faces)
+    corners = places(vertices)[faces]
+    flat = (corners == np.roll(corners, 1, axis=1)).any(axis=1)  # two corners at one place bound nothing
+    number, alike = twins(vertices, faces[~flat])
     balance = np.bincount(number, weights=np.where(alike, 1.0, -1.0))
     return len(faces) > 0 and not balance.any()

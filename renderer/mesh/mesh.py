@@ -10,14 +10,14 @@ from typing import Any, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.arguments.arrays import plain_array, real_array
+from renderer.arguments.arrays import plain_array, real_argument, real_array
 from renderer.arguments.types import ArrayLike
 from renderer.errors import MeshError
 from renderer.lazy import lazy
 from renderer.mesh.crease import Split
 from renderer.mesh.edges import open_edges
 from renderer.mesh.foreign import TriangleMesh, attributes_of, has_own_normals, has_triangles
-from renderer.mesh.mending import joined, twins
+from renderer.mesh.mending import cancels, joined, twins
 from renderer.mesh.parts import Part, parts_of
 from renderer.mesh.values import Owner
 
@@ -492,8 +492,8 @@ class Mesh:
         >>> len(apart.vertices), len(mesh.vertices), left_out
         (24, 8, 16)
         """
-        given = tolerance if isinstance(tolerance, int | float) and not isinstance(tolerance, bool) else -1.0
-        if not 0.0 <= given < np.inf:
+        given = real_argument("tolerance", tolerance)
+        if given.ndim or not 0.0 <= given < np.inf:
             raise self._error(f"tolerance: expected a finite number of at least 0, got {tolerance!r}")
         first = joined(self.vertices, float(given)) if len(self.vertices) else np.empty(0, np.int64)
         kept = np.unique(first)
@@ -532,7 +532,8 @@ class Mesh:
         """Return whether the faces bound a volume, so that ``Octree.contains`` takes the mesh.
 
         The mesh has faces, and each edge is passed as often in one direction as in the other. Edges are told apart by
-        the positions of their ends, so a mesh whose faces share no vertices, as in an STL file, can be closed.
+        the positions of their ends, so a mesh whose faces share no vertices, as in an STL file, can be closed. Faces
+        that are all there as often one way round as the other bound nothing.
 
         Returns
         -------
@@ -548,7 +549,7 @@ class Mesh:
         >>> box().is_closed(), grid().is_closed()
         (True, False)
         """
-        return len(self.faces) > 0 and len(self.open_edges) == 0
+        return len(self.faces) > 0 and len(self.open_edges) == 0 and not cancels(self.vertices, self.faces)
 
     @lazy
     def open_edges(self) -> NDArray[np.int64]:

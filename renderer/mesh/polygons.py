@@ -24,6 +24,8 @@ _TURNED_OVER = -1e-6
 _OUT_OF_PLANE = 0.05
 # Corners on one line, rounded to float64, make a triangle of less than this over the square of the extent.
 _FLAT = 1e-12
+_ROUNDED = 2.0**-52
+_TRIES = 8
 _BLOCK_CORNERS = 1 << 18
 
 
@@ -150,13 +152,17 @@ def _cut_outline(outline: _Floats) -> _Ints | None:
     # Imported here, because few files have such polygons.
     from mapbox_earcut import triangulate_float64
 
-    places = triangulate_float64(np.ascontiguousarray(outline), np.array([len(outline)], np.uint32))
-    triangles = places.reshape(-1, 3).astype(np.int64)
-    areas = _doubled_areas(outline, triangles)
-    fan = np.arange(1, len(outline) - 1)
-    whole = _doubled_areas(outline, np.stack([0 * fan, fan, fan + 1], axis=1)).sum()
-    right = len(areas) and areas.min() >= -_FLAT and abs(areas.sum() - whole) <= _FLAT * len(outline)
-    return triangles if right else None
+    ends, fan = np.array([len(outline)], np.uint32), np.arange(1, len(outline) - 1)
+    whole = _doubled_areas(outline, np.stack([0 * fan, fan, fan + 1], axis=1))
+    # What is missing is more than the sums round.
+    room = _ROUNDED * len(outline) * np.abs(whole).sum()
+    for first in range(min(len(outline), _TRIES)):  # from another corner it may find what it did not
+        places = triangulate_float64(np.roll(outline, -first, axis=0), ends).reshape(-1, 3)
+        triangles: _Ints = (places.astype(np.int64) + first) % len(outline)
+        areas = _doubled_areas(outline, triangles)
+        if len(areas) and areas.min() >= -_FLAT and abs(areas.sum() - whole.sum()) <= room:
+            return triangles
+    return None
 
 
 def _doubled_areas(outline: _Floats, triangles: _Ints) -> _Floats:

@@ -183,6 +183,7 @@ ZEROS = {"componentType": 5126, "count": 3 * 10**9, "type": "VEC3"}
         ({"accessors": [ZEROS]}, "accessor 0: its 3000000000 rows are more than the buffers hold"),
         ({"accessors": [ZEROS | {"count": 3}]}, "expected accessors with data, got none in accessor 0"),
         ({"accessors": [ZEROS | {"count": 4, "bufferView": 0}]}, "accessor 0: its 4 rows end beyond their bytes"),
+        ({"asset": {"version": "1.0"}, "meshes": {}}, "expected version 2.0, got version 1.0"),
         ({"extensionsRequired": ["KHR_draco_mesh_compression"]}, "needs the extension KHR_draco_mesh_compression"),
         ({"buffers": [{"byteLength": 36, "uri": "a.bin"}]}, r"buffer 0, 'a\.bin': cannot be read: No such file"),
         ({"buffers": [{"byteLength": 36, "uri": "http://x/a.bin"}]}, "expected the bytes of buffer 0, got 'http"),

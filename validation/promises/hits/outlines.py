@@ -26,8 +26,8 @@ _GRID, _LENGTHS = 5, (4, 5, 6, 7, 8)
 _FAR = 2**21 * np.array([(7, 5), (-5, 7), (-7, -6), (5, -9)])
 # More corners than fit a list that is searched from end to end.
 _MANY = 4096
-# So many points of each polygon's box. In units of a 21st of a place, they are on no line through two places.
-_POINTS, _UNIT, _ASIDE = 25, 21, (7, 3)
+# So many points of each polygon's box, on places that are so much finer than those of corners.
+_POINTS, _UNIT = 100, 64
 # The axes of a plane as whole numbers: upright and turned, seen from in front and from behind, and tilted.
 _FRAMES = np.array([
     [(1, 0, 0), (0, 1, 0)], [(0, 0, 1), (0, 1, 0)], [(0, 1, 0), (0, 0, 1)], [(0, 0, 1), (1, 0, 0)],
@@ -42,16 +42,20 @@ def check_outlines(rng: Generator, count: int) -> list[dict[str, Any]]:
     """
     outlines = [outline for length in _LENGTHS for outline in _random(rng, count, length)]
     outlines += _long(rng)
-    covered, kept = [], []
+    covered, kept, touching = [], [], []
     for outline, triangles in zip(outlines, _loaded(outlines, rng), strict=True):
         fan = _fan(len(outline))
-        if _covers(outline, fan, _samples(outline, rng)):
+        points = _samples(outline, rng)
+        if _covers(outline, fan, points):
             kept.append(np.array_equal(triangles, fan))
+        elif len(outline) > max(_LENGTHS) or not _meetings(outline[None])[0][0]:
+            covered.append(_covers(outline, triangles, points))
         else:
-            covered.append(_covers(outline, triangles, _samples(outline, rng)))
+            touching.append(np.array_equal(triangles, fan) or _covers(outline, triangles, points))
     return [
-        row("triangles cover a notched polygon as it winds around its points", _JUDGE, np.array(covered)),
+        row("triangles cover a notched polygon once, wound as it is", _JUDGE, np.array(covered)),
         row("a polygon keeps its fan where the fan is right", _JUDGE, np.array(kept)),
+        row("a polygon that touches itself is covered as it winds, or keeps its fan", _JUDGE, np.array(touching)),
     ]
 
 
@@ -122,9 +126,14 @@ def _fan(length: int) -> Whole:
 
 
 def _samples(outline: Whole, rng: Generator) -> Whole:
-    """Points of the outline's box, in units of which places are ``_UNIT`` apart, on no line through two places."""
-    low, high = outline.min(axis=0), outline.max(axis=0)
-    return rng.integers(low, np.maximum(high, low + 1), (_POINTS, 2)) * _UNIT + _ASIDE
+    """Points of the outline's box, in units of which places are ``_UNIT`` apart, on no line through two corners."""
+    corners = _UNIT * outline
+    points = rng.integers(corners.min(axis=0), corners.max(axis=0) + 1, (_POINTS, 2))
+    if len(outline) > max(_LENGTHS):
+        return points[points[:, 0] % _UNIT != 0]  # of long ones no triangle is flat but upright
+    first, second = np.triu_indices(len(outline), 1)
+    sides = _turn(corners[first][:, None], corners[second][:, None], points[None])
+    return points[(sides != 0).all(axis=0)]
 
 
 def _covers(outline: Whole, triangles: Whole, points: Whole) -> bool:
