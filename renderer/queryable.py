@@ -2,6 +2,7 @@
 
 from __future__ import annotations  # so that help() shows ArrayLike by its name
 
+import warnings
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from renderer.distance.closest import closest_point
 from renderer.distance.signed import signed_distance
 from renderer.distance.visible import visible
 from renderer.errors import expect
-from renderer.inside.contains import contains
+from renderer.inside.contains import contains, is_inside_out
 from renderer.inside.winding import winding_number
 from renderer.mesh.mesh import Mesh, Repairs
 from renderer.results.closest_points import ClosestPoints
@@ -370,7 +371,13 @@ class Queries:
         array([ True,  True, False])
         """
         mesh, tree = self._built
-        return contains(tree, mesh, points, boundary, rule, winding, self.threads)
+        inside = contains(tree, mesh, points, boundary, rule, winding, self.threads)
+        if winding and not inside.any() and is_inside_out(mesh):
+            turned = (
+                "the mesh is turned inside out, so that no point is inside: its faces are clockwise seen from outside"
+            )
+            warnings.warn(turned, UserWarning, stacklevel=2)
+        return inside
 
     def winding_number(self, points: ArrayLike, tolerance: float = 1e-3) -> NDArray[np.float64]:
         """Return how often the surface winds around each point: its solid angles over 4 pi.

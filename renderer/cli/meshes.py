@@ -59,10 +59,12 @@ def up_of(paths: Sequence[Path], given: str | None) -> tuple[str, str]:
     """The name of the axis that points up, and the line that says so where neither the user nor a file does."""
     if given is not None:
         return given, ""
-    silent = [path for path in paths if path.suffix.lower() != ".glb"]
+    from renderer.mesh.load import Y_UP, mesh_suffix
+
+    silent = [path for path in paths if mesh_suffix(path) not in Y_UP]
     if not silent:
         return _UP_OF_GLB, ""
-    expect(len(silent) == len(paths), "--up", "an axis for .glb files, whose y is up, beside others", "none")
+    expect(len(silent) == len(paths), "--up", "an axis for .glb and .gltf files, whose y is up, beside others", "none")
     who = f"{paths[0]} does" if len(paths) == 1 else "the mesh files do"
     return _UP, f"{who} not say which axis points up: {_UP} was taken; --up x|y|z changes it"
 

@@ -23,21 +23,20 @@ def add_scene(command: argparse.ArgumentParser, *, shown: bool = True) -> None:
 
 def say_up(scene: Path, up: str | None) -> None:
     """Say on standard error which axis is taken for up, where neither the user nor the file says it."""
-    from renderer.mesh.load import MESH_SUFFIXES
+    from renderer.mesh.load import Y_UP, mesh_suffix
 
-    suffix = scene.suffix.lower()
-    if up is None and suffix in MESH_SUFFIXES and suffix != ".glb":
+    if up is None and mesh_suffix(scene) not in (None, *Y_UP):
         line = f"{scene} does not say which axis points up: y was taken; --up x|y|z changes it"
         print(f"octree-render: {line}", file=sys.stderr)
 
 
 def write_scene_of(options: argparse.Namespace) -> None:
     """Write the scene of a mesh file, if ``--write-scene`` names a file."""
-    from renderer.mesh.load import MESH_SUFFIXES
+    from renderer.mesh.load import MESH_SUFFIXES, mesh_suffix
     from renderer.scene.scene import write_scene
 
     if options.write_scene is not None:
-        is_mesh = options.scene.suffix.lower() in MESH_SUFFIXES
+        is_mesh = mesh_suffix(options.scene) is not None
         expect(is_mesh, "--write-scene", f"a mesh file ({', '.join(MESH_SUFFIXES)})", str(options.scene))
         # It may have been changed since it was written.
         new = not os.path.lexists(options.write_scene)

@@ -17,13 +17,13 @@ _KINDS = {"sky": "sky view factor", "sun": "hours of sun", "ao": "ambient occlus
 # Options that one kind alone has, which are its function's.
 _OWN = {"sky": ("patches", "definition"), "sun": ("suns",), "ao": ("samples",)}
 _MESH = "mesh files (.ply, .obj, .stl, .glb); several are one mesh, and the summary has the values of each"
-_UP = "the axis that points up; default: y for .glb, else z. kind sun: with it, suns below the horizon do not count"
+_UP = "the axis that points up; default: y for glTF, else z. kind sun: with it, suns below the horizon do not count"
 _HIDE = "leave out the mesh files of this name or pattern, such as 'tree*.obj'; may be given again"
 _VERTICES = "a value for each vertex: the mean of its faces' values, weighted by their areas"
 _GRID = "points of a level grid this far apart, dropped from above on the mesh"
 _HEIGHT = "with --grid: do not drop the points; all have this height"
 _BOUNDS = "with --grid: the least and greatest corner of the region; default: that of the mesh"
-_POINTS = "points of an .npy file, (n, 3), or (n, 6) with normals, which otherwise point up"
+_POINTS = "points of an .npy, .csv, .xyz or .ply file, (n, 3), or (n, 6) with normals, which otherwise point up"
 _DISTANCE = "how far from a point a hit still counts; default: any distance"
 _RESOLUTION = "size of a .png with its legend; default: 960x720"
 

@@ -1,39 +1,55 @@
-"""Mesh files: PLY, OBJ, STL and GLB in, PLY out."""
+"""Mesh files: PLY, OBJ, STL, GLB and glTF in, plain or compressed by gzip; PLY out."""
 
 from __future__ import annotations
 
+import gzip
 import os
+import re
 import warnings
+import zlib
 from codecs import BOM_UTF8
 from collections.abc import Callable
 from dataclasses import replace
-
-import numpy as np
+from pathlib import Path
+from typing import BinaryIO
 
 from renderer.errors import MeshError, NoSuchMeshError
-from renderer.mesh.glb import parse_glb
-from renderer.mesh.mesh import Mesh, Repairs, RepairWarning
+from renderer.mesh.gltf import parse_gltf
+from renderer.mesh.mesh import Mesh, RepairWarning
 from renderer.mesh.obj import parse_obj
 from renderer.mesh.ply import format_ply, parse_ply
+from renderer.mesh.reading import Reading
 from renderer.mesh.stl import parse_stl
 from renderer.system.files import as_path, read_whole, write_atomically
 
+_GZIP = b"\x1f\x8b"
 
-def load_mesh(path: str | os.PathLike[str], name: str | None = None, *, repair: bool = False) -> Mesh:
-    """Return the triangle mesh in a .ply, .obj, .stl or .glb file.
 
-    Polygons are cut into triangles. Normals, colours and texture coordinates of vertices are kept; of GLB, colours only
-    if a mesh has no material, and texture coordinates only if it has one. Groups and objects of OBJ, nodes of
-    GLB and solids of STL are ``parts`` of the mesh. An STL file shares no vertices between its faces.
+def load_mesh(
+    path: str | os.PathLike[str] | bytes | BinaryIO,
+    name: str | None = None,
+    *,
+    repair: bool = False,
+    strict: bool = False,
+) -> Mesh:
+    """Return the triangle mesh in a .ply, .obj, .stl, .glb or .gltf file.
+
+    Polygons are cut into triangles. Normals, colours and texture coordinates of vertices are kept. Groups and objects
+    of OBJ, nodes of glTF and solids of STL are ``parts`` of the mesh. An STL file shares no vertices between its faces.
+    A ``RepairWarning`` names all else that the file has and the mesh has not.
 
     Parameters
     ----------
-    path : str or path
+    path : str, path, bytes or binary file
+        A file whose name ends in its kind, also before ``.gz``; or the content of one, whose kind is told by its first
+        bytes.
     name : str, optional
         The name of the mesh; by default that of the file, without its suffix.
     repair : bool, default False
         Leave out triangles that name a missing vertex or one that is not finite, as ``Mesh.repaired`` does, and issue a
         ``RepairWarning`` that counts them.
+    strict : bool, default False
+        Raise an error in place of a warning.
 
     Returns
     -------
@@ -49,9 +65,9 @@ def load_mesh(path: str | os.PathLike[str], name: str | None = None, *, repair: 
 
     Notes
     -----
-    Polygons are cut by a fan from the first corner; concave ones by their ears. The fan stays, though it may be wrong,
-    if a polygon touches or crosses itself, repeats a corner, has a hole by a bridge or more than 4096 corners, or is
-    far from flat.
+    Polygons are cut by a fan from the first corner if that covers them, else by mapbox_earcut, also those that touch
+    themselves or have a hole by a bridge. Those that cross themselves or are far from flat keep the fan, and are
+    named by the warning.
 
     Examples
     --------
@@ -60,50 +76,95 @@ def load_mesh(path: str | os.PathLike[str], name: str | None = None, *, repair: 
     >>> mesh.name, mesh.faces.shape, mesh.is_closed()
     ('torus_knot', (40000, 3), True)
     """
+    for argument, value in (("repair", repair), ("strict", strict)):
+        if not isinstance(value, bool):
+            raise MeshError(f"{argument}: expected True or False, got {value!r}")
+    shown, suffix, content, folder = _read(path)
+    reading = Reading(repair)
     try:
-        path = as_path("path", path)
+        mesh = parse_mesh(content, suffix, reading, folder)
+    except MeshError as error:
+        raise MeshError(f"{shown}: {error}") from error
+    said = [str(one) for one in (reading.total, *reading.notes) if one]
+    if said and strict:
+        raise MeshError(f"{shown}: {'; '.join(said)}")
+    if said:
+        warnings.warn(f"{shown}: {'; '.join(said)}", RepairWarning, stacklevel=2)
+    stem = "" if folder is None else Path(str(shown).removesuffix(".gz")).stem
+    return replace(mesh, name=stem if name is None else name)
+
+
+def _read(path: str | os.PathLike[str] | bytes | BinaryIO) -> tuple[object, str, bytes, Path | None]:
+    """What messages call a file, the suffix of its kind, its content, and the folder where it lies."""
+    if isinstance(path, bytes | bytearray | memoryview) or hasattr(path, "read"):
+        content = bytes(path) if isinstance(path, bytes | bytearray | memoryview) else path.read()
+        if not isinstance(content, bytes):
+            raise MeshError(f"path: expected a file opened as binary, got {type(content).__name__} from it")
+        content = _unpacked(content)
+        return "mesh", _kind(content), content, None
+    try:
+        file = as_path("path", path)
     except ValueError as error:
         raise MeshError(str(error)) from None
-    if not isinstance(repair, bool):
-        raise MeshError(f"repair: expected True or False, got {repair!r}")
-    if path.suffix.lower() not in _PARSERS:
-        raise MeshError(f"{path}: expected a suffix of {', '.join(_PARSERS)}, got {path.suffix!r}")
+    suffix = mesh_suffix(file)
+    if suffix is None:
+        raise MeshError(f"{file}: expected a suffix of {', '.join(MESH_SUFFIXES)}, got {file.suffix!r}")
     try:
-        content = read_whole(path)
+        content = read_whole(file)
     except FileNotFoundError as error:
-        raise NoSuchMeshError(f"{path}: cannot be read: {error.strerror}") from error
+        raise NoSuchMeshError(f"{file}: cannot be read: {error.strerror}") from error
     except OSError as error:
-        raise MeshError(f"{path}: cannot be read: {error.strerror or error}") from error
+        raise MeshError(f"{file}: cannot be read: {error.strerror or error}") from error
     try:
-        repairs: list[Repairs] | None = [] if repair else None
-        mesh = parse_mesh(content, path.suffix.lower(), repairs)
+        return file, suffix, _unpacked(content) if file.suffix.lower() == ".gz" else content, file.parent
     except MeshError as error:
-        raise MeshError(f"{path}: {error}") from error
-    if repairs and any(repairs):
-        warnings.warn(f"{path}: {_total(repairs)}", RepairWarning, stacklevel=2)
-    return replace(mesh, name=path.stem if name is None else name)
+        raise MeshError(f"{file}: {error}") from error
 
 
-def parse_mesh(content: bytes, suffix: str, repairs: list[Repairs] | None = None) -> Mesh:
-    """The mesh in a file's content; ``suffix`` is one of '.ply', '.obj', '.stl', '.glb'.
+def mesh_suffix(path: Path) -> str | None:
+    """The suffix of a mesh file's kind, of a compressed one that before ``.gz``; None for any other file."""
+    last = path.suffix.lower()
+    found = Path(path.stem).suffix.lower() if last == ".gz" else last
+    return found if found in MESH_SUFFIXES else None
 
-    repairs : a list to which the repairs are added that ``load_mesh`` makes with ``repair``, one per mesh of the file.
+
+def _unpacked(content: bytes) -> bytes:
+    """The content, of which gzip is known by its first bytes."""
+    if content[:2] != _GZIP:
+        return content
+    try:
+        return gzip.decompress(content)
+    except (OSError, EOFError, zlib.error) as error:
+        raise MeshError(f"malformed gzip: {str(error)[:80]}") from error
+
+
+def _kind(content: bytes) -> str:
+    """The suffix of a content's kind by its first bytes; OBJ, which begins in any way, where it is no other."""
+    begin = content.removeprefix(BOM_UTF8)[:512].lstrip()
+    if begin[:3] == b"ply" and begin[3:4].isspace():
+        return ".ply"
+    if begin[:4] == b"glTF":
+        return ".glb"
+    if begin[:1] == b"{":
+        return ".gltf"
+    words = any(re.match(rb"(v|vn|vt|f|o|g|mtllib|#)[ \t]", line) for line in begin.splitlines())
+    return ".obj" if words and begin[:5].lower() != b"solid" else ".stl"
+
+
+def parse_mesh(content: bytes, suffix: str, reading: Reading | None = None, folder: Path | None = None) -> Mesh:
+    """The mesh in a file's content; ``suffix`` is one of MESH_SUFFIXES, and ``folder`` has the buffers of a .gltf.
 
     Raises ``MeshError`` as ``load_mesh`` does, without the file's name.
     """
+    reading = reading or Reading()
     # Some editors begin a text with a byte order mark, which is no part of it. In STL only its length tells what it is.
     if suffix != ".stl":
         content = content.removeprefix(BOM_UTF8)
-    mesh = _PARSERS[suffix](content, repairs)
+    mesh = parse_gltf(content, reading, folder) if suffix in Y_UP else _PARSERS[suffix](content, reading)
     if len(mesh.faces) == 0:
-        raise MeshError(f"holds no good faces: {_total(repairs)}" if repairs and any(repairs) else "holds no faces")
+        said = "; ".join(str(one) for one in (reading.total, *reading.notes) if one)
+        raise MeshError(f"holds no good faces: {said}" if said else "holds no faces")
     return mesh
-
-
-def _total(repairs: list[Repairs]) -> Repairs:
-    """All meshes' repairs as if they were one mesh's; only the counts mean something."""
-    parts = ((r.dropped_faces, r.bad_vertices, r.kept_faces, r.bad_normals) for r in repairs)
-    return Repairs(*(np.concatenate(part) for part in zip(*parts, strict=True)))
 
 
 def save_ply(mesh: Mesh, path: str | os.PathLike[str]) -> None:
@@ -111,12 +172,9 @@ def save_ply(mesh: Mesh, path: str | os.PathLike[str]) -> None:
     write_atomically(path, lambda file: file.write(format_ply(mesh)))
 
 
-_PARSERS: dict[str, Callable[[bytes, list[Repairs] | None], Mesh]] = {
-    ".ply": parse_ply,
-    ".obj": parse_obj,
-    ".stl": parse_stl,
-    ".glb": parse_glb,
-}
+_PARSERS: dict[str, Callable[[bytes, Reading], Mesh]] = {".ply": parse_ply, ".obj": parse_obj, ".stl": parse_stl}
+# Of glTF, in which y points up by its specification.
+Y_UP = (".glb", ".gltf")
 
 # The suffixes of files that ``load_mesh`` reads.
-MESH_SUFFIXES = tuple(_PARSERS)
+MESH_SUFFIXES = (*_PARSERS, *Y_UP)

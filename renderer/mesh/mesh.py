@@ -10,13 +10,14 @@ from typing import Any, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.arguments.arrays import plain_array, real_array
+from renderer.arguments.arrays import plain_array, real_argument, real_array
 from renderer.arguments.types import ArrayLike
 from renderer.errors import MeshError
 from renderer.lazy import lazy
 from renderer.mesh.crease import Split
 from renderer.mesh.edges import open_edges
 from renderer.mesh.foreign import TriangleMesh, attributes_of, has_own_normals, has_triangles
+from renderer.mesh.mending import cancels, joined, twins
 from renderer.mesh.parts import Part, parts_of
 from renderer.mesh.values import Owner
 
@@ -251,7 +252,8 @@ class Mesh:
         >>> from renderer import load_mesh
         >>> from renderer.mesh.shapes import box
         >>> with tempfile.TemporaryDirectory() as folder:
-        ...     box().save(f"{folder}/box.ply", values=range(12))
+        ...     box().save(f"{folder}/values.ply", values=range(12))
+        ...     box().save(f"{folder}/box.ply")
         ...     load_mesh(f"{folder}/box.ply").faces.shape
         (12, 3)
         """
@@ -461,11 +463,77 @@ class Mesh:
         sums = [np.bincount(group, along.ravel(), minlength=count).astype(np.float64) for along in weighted]
         return np.stack(_unit((sums[0], sums[1], sums[2])), axis=1)
 
+    def welded(self, tolerance: float = 0.0) -> tuple[Mesh, int]:
+        """Return the mesh with vertices at one place joined, and how many were left out.
+
+        Faces keep their order and number. A joined vertex has the place, colour and texture coordinates of the first of
+        them; normals are left out, since they differ where faces were apart.
+
+        Parameters
+        ----------
+        tolerance : float, default 0.0
+            The distance up to which vertices are joined, also by steps over others. 0 joins equal places alone.
+
+        Returns
+        -------
+        mesh : Mesh
+        left_out : int
+
+        Raises
+        ------
+        MeshError
+            For a tolerance that is negative, or no finite number.
+
+        Examples
+        --------
+        >>> from renderer.mesh.shapes import box
+        >>> apart = box().creased()
+        >>> mesh, left_out = apart.welded()
+        >>> len(apart.vertices), len(mesh.vertices), left_out
+        (24, 8, 16)
+        """
+        given = real_argument("tolerance", tolerance)
+        if given.ndim or not 0.0 <= given < np.inf:
+            raise self._error(f"tolerance: expected a finite number of at least 0, got {tolerance!r}")
+        first = joined(self.vertices, float(given)) if len(self.vertices) else np.empty(0, np.int64)
+        kept = np.unique(first)
+        colors, texcoords = (None if a is None else a[kept] for a in (self.colors, self.texcoords))
+        faces = np.searchsorted(kept, first[self.faces])
+        made = Mesh(self.vertices[kept], faces, None, colors, texcoords, self.name)
+        return give_parts(made, self.parts), len(self.vertices) - len(kept)
+
+    def without_duplicates(self) -> tuple[Mesh, int]:
+        """Return the mesh without faces that are there twice, turned or not, and how many were left out.
+
+        Of faces with the same three corners, told apart by position, the first stays. Vertices stay as they are.
+
+        Returns
+        -------
+        mesh : Mesh
+        left_out : int
+
+        Examples
+        --------
+        >>> from renderer import Mesh
+        >>> from renderer.mesh.shapes import box
+        >>> twice = Mesh.concatenate(box(), Mesh(box().vertices, box().faces[:, ::-1]))
+        >>> mesh, left_out = twice.without_duplicates()
+        >>> len(twice.faces), len(mesh.faces), left_out
+        (24, 12, 12)
+        """
+        _, rows = np.unique(twins(self.vertices, self.faces).number, return_index=True)
+        kept = np.sort(rows)
+        made = Mesh(self.vertices, self.faces[kept], self.normals, self.colors, self.texcoords, self.name)
+        ends = np.searchsorted(kept, [part.faces.stop for part in self.parts])
+        parts = parts_of([part.name for part in self.parts], np.diff(ends, prepend=0).tolist())
+        return give_parts(made, parts), len(self.faces) - len(kept)
+
     def is_closed(self) -> bool:
         """Return whether the faces bound a volume, so that ``Octree.contains`` takes the mesh.
 
         The mesh has faces, and each edge is passed as often in one direction as in the other. Edges are told apart by
-        the positions of their ends, so a mesh whose faces share no vertices, as in an STL file, can be closed.
+        the positions of their ends, so a mesh whose faces share no vertices, as in an STL file, can be closed. Faces
+        that are all there as often one way round as the other bound nothing.
 
         Returns
         -------
@@ -481,7 +549,7 @@ class Mesh:
         >>> box().is_closed(), grid().is_closed()
         (True, False)
         """
-        return len(self.faces) > 0 and len(self.open_edges) == 0
+        return len(self.faces) > 0 and len(self.open_edges) == 0 and not cancels(self.vertices, self.faces)
 
     @lazy
     def open_edges(self) -> NDArray[np.int64]:
@@ -736,15 +804,6 @@ def face_normals(corners: Float64Array) -> Float64Array:
     if beyond.any():
         normals[beyond] = face_normals(corners[beyond] * 0.25)
     return normals
-
-
-def build_mesh(repairs: list[Repairs] | None, vertices: Any, faces: Any, **attributes: Any) -> Mesh:
-    """``Mesh(...)``, or, where a list of repairs is given, ``Mesh.repaired(...)`` with its ``Repairs`` added there."""
-    if repairs is None:
-        return Mesh(vertices, faces, **attributes)
-    mesh, made = Mesh.repaired(vertices, faces, **attributes)
-    repairs.append(made)
-    return mesh
 
 
 _VERTEX_ATTRIBUTES: tuple[tuple[str, int, type[np.floating]], ...] = (

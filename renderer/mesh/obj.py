@@ -7,6 +7,7 @@ face uses (NaN among them), and reorders faces by material.
 from __future__ import annotations
 
 import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -16,15 +17,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import MeshError
-from renderer.mesh.mesh import Float64Array, Mesh, Repairs, build_mesh, give_parts
+from renderer.mesh.mesh import Float64Array, Mesh, give_parts
 from renderer.mesh.parts import Part, runs_of
 from renderer.mesh.polygons import triangulate
+from renderer.mesh.reading import Reading
 
-# Statements that say nothing about surfaces made of polygons. Free-form surfaces are refused, not dropped.
+# Statements that say nothing about surfaces.
 _IGNORED = {
-    *("g", "o", "s", "l", "p", "mg", "vp", "usemtl", "mtllib", "usemap", "maplib"),
-    *("bevel", "c_interp", "d_interp", "lod", "shadow_obj", "trace_obj"),
+    *("g", "o", "s", "l", "p", "mg", "vp", "bevel", "c_interp", "d_interp", "lod", "shadow_obj", "trace_obj"),
 }
+# Those that have no place in a mesh, and what a note calls them.
+_LEFT_OUT = dict.fromkeys(("usemtl", "mtllib", "usemap", "maplib"), "materials") | dict.fromkeys(
+    ("cstype", "deg", "bmat", "step", "curv", "curv2", "surf", "parm", "trim", "hole", "scrv", "sp", "end", "con",
+     "ctech", "stech"), "free-form curves and surfaces"
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -40,6 +46,7 @@ class _Content:
     corners: NDArray[np.int64]
     starts: NDArray[np.int64]  # polygon p has corners[starts[p] : starts[p + 1]]
     groups: list[_Group]
+    left_out: set[str]  # keywords of statements that have no place in a mesh
 
 
 class _Group(NamedTuple):
@@ -49,40 +56,60 @@ class _Group(NamedTuple):
     name: str
 
 
-def parse_obj(content: bytes, repairs: list[Repairs] | None = None) -> Mesh:
+def parse_obj(content: bytes, reading: Reading | None = None) -> Mesh:
     """The mesh in an OBJ file's content.
 
     Polygons are cut as ``polygons.triangulate`` says. A face may stand before what it names; a negative index counts
     back from what stands before the face. A vertex is split where its faces differ in texture coordinate or normal.
     Where only some faces have texture coordinates, the others get (0, 0); where only some have normals, the normals
     are left out, since they follow from the faces. Vertex colours after the position are kept where every vertex has
-    them. The last ``g`` or ``o`` before a face names its part. Lines, points and materials are ignored. ``repairs`` as
-    for ``build_mesh``; faces are then dropped for any index out of range.
+    them. The last ``g`` or ``o`` before a face names its part. Lines and points are ignored. What else is left out is
+    noted: materials, free-form surfaces, unknown statements, indices of normals and texture coordinates that name
+    nothing, faces of fewer than three corners.
 
     Raises ``MeshError`` with the line's number; it does not know the file's name.
     """
+    reading = reading or Reading()
+    content = _in_utf8(content)
     read = _read_common(content)
-    read = _read_any(content, repairs is not None) if read is None else read
-    mesh = _mesh(read, repairs)
-    return give_parts(mesh, _parts(read, repairs[-1].kept_faces if repairs else None))
+    read = _read_any(content, reading) if read is None else read
+    for what in sorted({_LEFT_OUT[keyword] for keyword in read.left_out}):
+        reading.note(f"left out: {what}")
+    return _mesh(read, reading)
 
 
-def _parts(content: _Content, kept: NDArray[np.int64] | None) -> tuple[Part, ...]:
-    """The parts that groups make, of the triangles that were kept."""
+def _in_utf8(content: bytes) -> bytes:
+    """The content, of which UTF-16 is known by its byte order mark."""
+    if content[:2] not in (BOM_UTF16_LE, BOM_UTF16_BE):
+        return content
+    return content.decode("utf-16", "replace").encode()
+
+
+def _parts(content: _Content, polygons: NDArray[np.int64], reading: Reading) -> tuple[Part, ...]:
+    """The parts that groups make; ``polygons`` has that of each triangle."""
     firsts = np.array([*(group.first for group in content.groups), len(content.starts) - 1], np.int64)
-    # A polygon of n corners has n - 2 triangles.
-    ends = content.starts[firsts] - 2 * firsts
-    ends = ends if kept is None else np.searchsorted(kept, ends)
-    return runs_of(["", *(group.name for group in content.groups)], ends.tolist())
+    ends = np.searchsorted(polygons, firsts)
+    return runs_of(["", *(group.name for group in content.groups)], reading.kept(ends))
 
 
-def _mesh(content: _Content, repairs: list[Repairs] | None) -> Mesh:
-    triangles = triangulate(content.positions, content.corners[:, 0], content.starts)
-    corners = content.corners[triangles.ravel()]
+def _mesh(content: _Content, reading: Reading) -> Mesh:
+    cut = triangulate(content.positions, content.corners[:, 0], content.starts)
+    if len(cut.wrong):
+        reading.note("polygons that cross themselves or are far from flat are cut as fans, by the number of the face:",
+                     (cut.wrong + 1).tolist())  # fmt: skip
+    mesh = _split(content, content.corners[cut.places.ravel()], reading)
+    return give_parts(mesh, _parts(content, cut.polygons, reading))
+
+
+def _split(content: _Content, corners: NDArray[np.int64], reading: Reading) -> Mesh:
+    """The mesh of the triangles' corners, its vertices split where texture coordinates or normals differ."""
     positions, colors = content.positions, content.colors
-    by_position = build_mesh(repairs, positions, corners[:, 0].reshape(-1, 3).astype(np.int32), colors=colors)
-    if repairs:
-        corners = corners.reshape(-1, 9)[repairs[-1].kept_faces].reshape(-1, 3)
+    if colors is not None and not np.isfinite(colors).all():
+        reading.note("left out: vertex colours that are not numbers")
+        colors = None
+    by_position = reading.mesh(positions, corners[:, 0].reshape(-1, 3).astype(np.int32), colors=colors)
+    if reading.repairs:
+        corners = corners.reshape(-1, 9)[reading.repairs[-1].kept_faces].reshape(-1, 3)
     if (corners[:, 1:] == -1).all():
         return by_position
     distinct, faces = distinct_rows(corners, len(positions))
@@ -130,7 +157,7 @@ def _read_common(content: bytes) -> _Content | None:
     found = _blocks(content + b"\n")
     if found is None or not found[0]["v"] or not found[0]["f"]:
         return None
-    blocks, groups = found
+    blocks, groups, left_out = found
     try:
         position = _table(blocks["v"], b"v", 3)
         texcoord = _table(blocks["vt"], b"vt", 1)
@@ -142,11 +169,13 @@ def _read_common(content: bytes) -> _Content | None:
         return None
     colors = position[:, 3:6] if position.shape[1] >= 6 else None
     texcoord = np.pad(texcoord, ((0, 0), (0, 1)))[:, :2]
-    return _Content(np.ascontiguousarray(position[:, :3]), colors, texcoord, normal[:, :3], *faces, groups)
+    return _Content(np.ascontiguousarray(position[:, :3]), colors, texcoord, normal[:, :3], *faces, groups, left_out)
 
 
-def _blocks(content: bytes) -> tuple[dict[str, bytes], list[_Group]] | None:
-    """All lines of each keyword that matters, end to end; None if any other line is not certain to be ignored."""
+def _blocks(content: bytes) -> tuple[dict[str, bytes], list[_Group], set[str]] | None:
+    """All lines of each keyword that matters, end to end; the groups; and the keywords of what is left out. None if any
+    other line is not certain to be ignored.
+    """
     letters = np.frombuffer(content, np.uint8)
     ends = np.flatnonzero(letters == ord("\n")) + 1
     starts = np.concatenate([[0], ends[:-1]])
@@ -160,11 +189,15 @@ def _blocks(content: bytes) -> tuple[dict[str, bytes], list[_Group]] | None:
         "f": (first == ord("f")) & blank,
     }
     rest = ~np.logical_or.reduce([*rows.values(), first == ord("#"), first == ord("\n")])
-    groups, before = [], np.cumsum(rows["f"])
+    groups, left_out, before = [], set(), np.cumsum(rows["f"])
     for start, end, polygons in zip(starts[rest].tolist(), ends[rest].tolist(), before[rest].tolist(), strict=True):
         keyword = content[start:end].split(None, 1)[:1]
-        if content[start : start + 1] != b"\r" and (not keyword or keyword[0].decode("latin-1") not in _IGNORED):
-            return None
+        if content[start : start + 1] != b"\r":
+            word = keyword[0].decode("latin-1") if keyword else ""
+            if word in _LEFT_OUT:
+                left_out.add(word)
+            elif word not in _IGNORED:
+                return None
         if keyword in ([b"g"], [b"o"]):
             words = content[start:end].decode("utf-8", "replace").partition("#")[0].split()
             groups.append(_Group(polygons, " ".join(words[1:])))
@@ -174,7 +207,7 @@ def _blocks(content: bytes) -> tuple[dict[str, bytes], list[_Group]] | None:
         changes = np.flatnonzero(np.diff(chosen, prepend=False, append=False))
         edges = np.append(starts, len(content))[changes].tolist()
         blocks[name] = b"".join([content[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True)])
-    return blocks, groups
+    return blocks, groups, left_out
 
 
 def _table(block: bytes, keyword: bytes, least: int) -> Float64Array:
@@ -230,7 +263,7 @@ def _faces(block: bytes, counts: list[int]) -> tuple[NDArray[np.int64], NDArray[
 
 @dataclass
 class _Statements:
-    keeps_bad_faces: bool
+    reading: Reading
     totals: Counter[str]  # of statements in the whole file, by keyword
     positions: list[list[float]] = field(default_factory=list)
     colors: list[list[float]] = field(default_factory=list)
@@ -239,11 +272,13 @@ class _Statements:
     corners: list[tuple[int, int, int]] = field(default_factory=list)
     lengths: list[int] = field(default_factory=list)
     groups: list[_Group] = field(default_factory=list)
+    left_out: set[str] = field(default_factory=set)
+    unknown: list[str] = field(default_factory=list)
 
 
-def _read_any(content: bytes, keeps_bad_faces: bool) -> _Content:
+def _read_any(content: bytes, reading: Reading) -> _Content:
     lines = list(_logical_lines(content.decode("utf-8", "replace")))
-    statements = _Statements(keeps_bad_faces, Counter(word for _, line in lines for word in line.split(None, 1)[:1]))
+    statements = _Statements(reading, Counter(word for _, line in lines for word in line.split(None, 1)[:1]))
     for number, line in lines:
         # The rest is a comment, at the end of a statement too, which many programs write.
         words = line.partition("#")[0].split()
@@ -261,6 +296,10 @@ def _read_any(content: bytes, keeps_bad_faces: bool) -> _Content:
         except ValueError as error:
             raise MeshError(f"line {number}: {str(error)[:100]}, got {line.strip()[:80]!r}") from error
     has_colors = len(statements.colors) == len(statements.positions)
+    if statements.colors and not has_colors:
+        reading.note("left out: vertex colours, which only some vertices have")
+    if statements.unknown:
+        reading.note("left out: unknown statements", statements.unknown)
     return _Content(
         np.array(statements.positions, np.float64).reshape(-1, 3),
         np.array(statements.colors, np.float64) if has_colors else None,
@@ -269,6 +308,7 @@ def _read_any(content: bytes, keeps_bad_faces: bool) -> _Content:
         np.array(statements.corners, np.int64).reshape(-1, 3),
         np.cumsum([0, *statements.lengths]),
         statements.groups,
+        statements.left_out,
     )
 
 
@@ -288,7 +328,10 @@ def _logical_lines(text: str) -> Iterator[tuple[int, str]]:
 def _read_statement(keyword: str, words: list[str], statements: _Statements) -> None:
     match keyword:
         case "v":
-            numbers = _numbers(words, 3)
+            numbers = _numbers(words, 2)
+            if len(numbers) == 2:
+                statements.reading.note("vertices of two numbers have z = 0")
+                numbers.append(0.0)
             statements.positions.append(numbers[:3])
             if len(numbers) >= 6:
                 statements.colors.append(numbers[3:6])
@@ -297,14 +340,18 @@ def _read_statement(keyword: str, words: list[str], statements: _Statements) -> 
         case "vn":
             statements.normals.append(_numbers(words, 3)[:3])
         case "f":
+            corners = [_corner(word, statements) for word in words]
             if len(words) < 3:
-                raise ValueError("expected a face of at least 3 vertices")
-            statements.corners += [_corner(word, statements) for word in words]
+                statements.reading.note("left out: faces of fewer than three corners")
+                return
+            statements.corners += corners
             statements.lengths.append(len(words))
         case "g" | "o":
             statements.groups.append(_Group(len(statements.lengths), " ".join(words)))
+        case _ if keyword in _LEFT_OUT:
+            statements.left_out.add(keyword)
         case _ if keyword not in _IGNORED:
-            raise ValueError("expected a statement of a polygon mesh")
+            statements.unknown.append(keyword)
 
 
 def _numbers(words: list[str], least: int) -> list[float]:
@@ -318,20 +365,24 @@ def _corner(word: str, statements: _Statements) -> tuple[int, int, int]:
     if len(parts) > 3:
         raise ValueError("expected a corner like 1, 1/2, 1//3 or 1/2/3")
     position, texcoord, normal = [*parts, "", ""][:3]
-    try:
-        return (
-            _index(int(position), len(statements.positions), statements.totals["v"]),
-            _index(int(texcoord), len(statements.texcoords), statements.totals["vt"]) if texcoord else -1,
-            _index(int(normal), len(statements.normals), statements.totals["vn"]) if normal else -1,
-        )
-    except IndexError as error:
-        if statements.keeps_bad_faces:
-            return (-1, -1, -1)
-        raise ValueError(str(error)) from error
+    totals, reading = statements.totals, statements.reading
+    so_far, total = len(statements.positions), totals["v"]
+    vertex = _index(int(position), so_far, total)
+    if vertex is None and not reading.repair:
+        raise ValueError(f"vertex index out of range: expected 1 to {total} or -{so_far} to -1")
+    found = [-1 if vertex is None else vertex]
+    for text, rows, keyword, name in (
+        (texcoord, statements.texcoords, "vt", "texture"), (normal, statements.normals, "vn", "normal"),
+    ):  # fmt: skip
+        index = _index(int(text), len(rows), totals[keyword]) if text else None
+        if text and index is None:
+            reading.note(f"left out: {name} indices that name nothing")
+        found.append(-1 if index is None else index)
+    return found[0], found[1], found[2]
 
 
-def _index(index: int, so_far: int, total: int) -> int:
-    """From 1 .. total, or -1 .. -so_far for the latest back to the first, to 0 .. total - 1."""
+def _index(index: int, so_far: int, total: int) -> int | None:
+    """From 1 .. total, or -1 .. -so_far for the latest back to the first, to 0 .. total - 1; None for any other."""
     if not (1 <= index <= total or 1 <= -index <= so_far):
-        raise IndexError(f"face index out of range: expected 1 to {total} or -{so_far} to -1")
+        return None
     return index - 1 if index > 0 else so_far + index

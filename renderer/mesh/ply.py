@@ -15,19 +15,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import MeshError
-from renderer.mesh.mesh import Float64Array, Mesh, Repairs, build_mesh
+from renderer.mesh.mesh import Float64Array, Mesh
 from renderer.mesh.polygons import triangulate
+from renderer.mesh.reading import Reading
 
 _TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
     "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
-    "float": "f4", "double": "f8", "float32": "f4", "float64": "f8",
+    "int64": "i8", "uint64": "u8", "float": "f4", "double": "f8", "float32": "f4", "float64": "f8",
 }  # fmt: skip
 _KEYWORDS = {"f4": "float", "f8": "double", "u1": "uchar"}  # of what is written
 _ByteOrder = Literal["<", ">", "="]
 _ASCII: _ByteOrder = "="  # its numbers are turned into native doubles
 _BYTE_ORDERS: dict[str, _ByteOrder] = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": _ASCII}
+_XYZ, _NORMAL = ("x", "y", "z"), ("nx", "ny", "nz")
 _INDEX_NAMES = ("vertex_indices", "vertex_index")
+_KEPT = {"x", "y", "z", "nx", "ny", "nz", "red", "green", "blue", "s", "t", "u", "v", "texture_u", "texture_v"}
 _TEXCOORD_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 
 # Real headers are a few hundred bytes; beyond this a missing end_header is certain enough to stop looking.
@@ -62,39 +65,69 @@ class _Column:
 _Columns = dict[str, _Column]
 
 
-def parse_ply(content: bytes, repairs: list[Repairs] | None = None) -> Mesh:
+def parse_ply(content: bytes, reading: Reading | None = None) -> Mesh:
     """The mesh in a PLY file's content.
 
     Faces come from the elements ``face`` (polygons are cut as ``polygons.triangulate`` says) and ``tristrips``
     (-1 restarts a strip; every second triangle is turned; stitching triangles without area stay), in the file's
-    order. Vertex normals, colours (red, green, blue; unsigned integers are
-    divided by their type's maximum) and texture coordinates (s t, u v or texture_u texture_v) are kept; other
-    properties and elements are ignored. ``repairs`` as for ``build_mesh``.
+    order. Vertex normals, colours (red, green, blue; integers are
+    divided by 255 or by their type's maximum) and texture coordinates (s t, u v or texture_u texture_v) are
+    kept. Other properties and elements are left out and noted, as are faces of fewer than three corners, header lines
+    of no meaning and bytes behind the last element.
 
     Raises ``MeshError``, which does not know the file's name.
     """
-    byte_order, elements, body_start = _parse_header(content)
-    if byte_order == _ASCII:
-        content, elements = _ascii_as_doubles(content[body_start:]), [_in_doubles(e) for e in elements]
-        body_start = 0
-    columns = _read_elements(content, body_start, elements, byte_order)
-    if "vertex" not in columns:
-        raise MeshError(f"expected an element 'vertex', got {', '.join(columns) or 'no element'}")
+    reading = reading or Reading()
+    columns, elements = _vertices(content, reading)
+    _note_left_out(elements, reading)
     vertex = columns["vertex"]
-    positions = _vertex_columns(vertex, ("x", "y", "z"))
+    positions = _vertex_columns(vertex, _XYZ)
     if positions is None:
         raise MeshError(f"element vertex: expected properties x, y and z, got {', '.join(vertex) or 'none'}")
     lists = [(e.name, _corners(e.name, columns[e.name])) for e in elements if e.name in ("face", "tristrips")]
-    faces = [_strips(corners) if name == "tristrips" else _polygons(corners, positions) for name, corners in lists]
+    faces = [
+        _strips(corners) if name == "tristrips" else _polygons(corners, positions, reading) for name, corners in lists
+    ]
     texcoords = (_vertex_columns(vertex, names) for names in _TEXCOORD_NAMES)
-    return build_mesh(
-        repairs,
+    return reading.mesh(
         positions,
         np.concatenate([np.empty((0, 3), np.int64), *faces]),
-        normals=_vertex_columns(vertex, ("nx", "ny", "nz")),
-        colors=_colors(vertex),
+        normals=_vertex_columns(vertex, _NORMAL),
+        colors=_colors(vertex, reading),
         texcoords=next((pair for pair in texcoords if pair is not None), None),
     )
+
+
+def _vertices(content: bytes, reading: Reading) -> tuple[dict[str, _Columns], list[_Element]]:
+    """The columns of a file's elements, vertices among them, and the elements."""
+    byte_order, elements, body_start = _parse_header(content, reading)
+    if byte_order == _ASCII:
+        content, elements = _ascii_as_doubles(content[body_start:]), [_in_doubles(e) for e in elements]
+        body_start = 0
+    columns = _read_elements(content, body_start, elements, byte_order, reading)
+    if "vertex" not in columns:
+        raise MeshError(f"expected an element 'vertex', got {', '.join(columns) or 'no element'}")
+    return columns, elements
+
+
+def _note_left_out(elements: list[_Element], reading: Reading) -> None:
+    """Note elements and properties that have no place in a mesh."""
+    places = {"vertex": _KEPT, "face": set(_INDEX_NAMES), "tristrips": set(_INDEX_NAMES)}
+    for element in elements:
+        names = [p.name for p in element.properties if p.name not in places.get(element.name, ())]
+        if element.name not in places and element.count:
+            reading.note(f"left out: element {element.name}")
+        elif names and element.count:
+            reading.note(f"left out of element {element.name}:", names)
+
+
+def point_rows(content: bytes) -> NDArray[np.float64]:
+    """The vertices of a file, (n, 3), or (n, 6) with normals; it needs no faces. Raises ``MeshError``."""
+    vertex = _vertices(content, Reading())[0]["vertex"]
+    positions, normals = (_vertex_columns(vertex, names) for names in (_XYZ, _NORMAL))
+    if positions is None:
+        raise MeshError(f"element vertex: expected properties x, y and z, got {', '.join(vertex) or 'none'}")
+    return positions if normals is None else np.concatenate([positions, normals], axis=1)
 
 
 def format_ply(mesh: Mesh) -> bytes:
@@ -158,7 +191,7 @@ def _packed(columns: dict[str, NDArray[Any]]) -> bytes:
 # --- header -------------------------------------------------------------------------------------------------
 
 
-def _parse_header(content: bytes) -> tuple[_ByteOrder, list[_Element], int]:
+def _parse_header(content: bytes, reading: Reading) -> tuple[_ByteOrder, list[_Element], int]:
     """Byte order, elements, and the start of the body."""
     if re.match(rb"ply[ \t]*(\r\n|\r|\n)", content) is None:
         raise MeshError(f"expected a first line 'ply', got {content[:16]!r}")
@@ -172,7 +205,9 @@ def _parse_header(content: bytes) -> tuple[_ByteOrder, list[_Element], int]:
         match line.split():
             case [] | ["comment" | "obj_info", *_]:
                 pass
-            case ["format", word, "1.0"] if word in _BYTE_ORDERS and byte_order is None:
+            case ["format", word, version] if (
+                word in _BYTE_ORDERS and re.fullmatch(r"1\.0+", version) and byte_order is None
+            ):
                 byte_order = _BYTE_ORDERS[word]
             case ["element", name, count] if re.fullmatch("[0-9]{1,18}", count):
                 if name in [other[0] for other in elements]:
@@ -182,8 +217,12 @@ def _parse_header(content: bytes) -> tuple[_ByteOrder, list[_Element], int]:
                 if property_.name in [other.name for other in elements[-1][2]]:
                     raise MeshError(f"header line {number}: property {property_.name!r} stands twice")
                 elements[-1][2].append(property_)
-            case _:
+            case ["property", value, _] | ["property", "list", _, value, _] if elements and value not in _TYPES:
+                raise MeshError(f"header line {number}: expected a type of PLY, got {value[:40]!r}")
+            case ["format" | "element" | "property" | "ply", *_]:
                 raise MeshError(f"header line {number}: expected a PLY header line, got {line[:80]!r}")
+            case [word, *_]:
+                reading.note("left out: header lines that begin with", [word])
     if byte_order is None:
         raise MeshError("header: expected a line 'format', found none")
     return byte_order, [_Element(name, count, tuple(rows)) for name, count, rows in elements], end.end()
@@ -220,7 +259,7 @@ def _in_doubles(element: _Element) -> _Element:
 
 
 def _read_elements(
-    content: bytes, position: int, elements: list[_Element], byte_order: _ByteOrder
+    content: bytes, position: int, elements: list[_Element], byte_order: _ByteOrder, reading: Reading
 ) -> dict[str, _Columns]:
     columns: dict[str, _Columns] = {}
     for element in elements:
@@ -229,9 +268,9 @@ def _read_elements(
         if element.count * least > len(content) - position:
             raise MeshError(f"truncated: too short for the {element.count} rows of element {element.name}")
         columns[element.name], position = _read_rows(content, position, element, byte_order)
-    # Some writers pad; anything else after the last row means that the header is wrong.
+    # Some writers pad.
     if content[position:].strip(b"\0 \t\r\n"):
-        raise MeshError("expected the end of the file after the last element, got more")
+        reading.note("left out: what stands behind the last element")
     return columns
 
 
@@ -322,16 +361,26 @@ def _vertex_columns(vertex: _Columns, names: tuple[str, ...]) -> Float64Array | 
         return np.stack([column.values.astype(np.float64) for column in columns], axis=1)
 
 
-def _colors(vertex: _Columns) -> Float64Array | None:
+def _colors(vertex: _Columns, reading: Reading) -> Float64Array | None:
     names = ("red", "green", "blue")
     colors = _vertex_columns(vertex, names)
     if colors is None:
         return None
-    types = [vertex[name].property.type for name in names]
-    if any(type_.kind == "i" for type_ in types):
-        raise MeshError(f"element vertex: expected colours of an unsigned or floating type, got {types[0]}")
-    scale = [1 if type_.kind == "f" else np.iinfo(type_).max for type_ in types]
+    scale = np.array([_full(vertex[name].property.type, column) for name, column in zip(names, colors.T, strict=True)])
+    with np.errstate(invalid="ignore"):  # NaN, which does not fit either
+        fit = np.isfinite(colors) & ((scale == 1.0) | ((colors >= 0.0) & (colors <= scale)))
+    if not fit.all():
+        reading.note("left out: vertex colours that do not fit their type or 0 to 255")
+        return None
     return colors / scale
+
+
+def _full(type_: np.dtype[Any], values: Float64Array) -> float:
+    """What stands for 1: 255 for signed integers, and for unsigned ones of 32 bits and more where none is larger."""
+    if type_.kind == "f":
+        return 1.0
+    few = type_.kind == "i" or (type_.itemsize > 2 and values.max(initial=0.0) <= 255.0)
+    return 255.0 if few else float(np.iinfo(type_).max)
 
 
 def _corners(element: str, columns: _Columns) -> _Column:
@@ -350,13 +399,18 @@ def _corners(element: str, columns: _Columns) -> _Column:
     return replace(lists[0], values=values.astype(np.int64))
 
 
-def _polygons(polygons: _Column, positions: Float64Array) -> NDArray[np.int64]:
+def _polygons(polygons: _Column, positions: Float64Array, reading: Reading) -> NDArray[np.int64]:
     """(F, 3) triangles."""
     lengths = np.diff(polygons.starts)
+    corners, rows = polygons.values, np.arange(len(lengths))
     if (lengths < 3).any():
-        row = int((lengths < 3).argmax())
-        raise MeshError(f"element face: expected at least 3 vertices, got {lengths[row]} in row {row}")
-    triangles: NDArray[np.int64] = polygons.values[triangulate(positions, polygons.values, polygons.starts)]
+        reading.note("left out: faces of fewer than three corners")
+        corners, rows = corners[np.repeat(lengths >= 3, lengths)], rows[lengths >= 3]
+    cut = triangulate(positions, corners, np.concatenate([[0], np.cumsum(lengths[rows])]))
+    if len(cut.wrong):
+        reading.note("polygons that cross themselves or are far from flat are cut as fans, by the row of the face:",
+                     rows[cut.wrong].tolist())  # fmt: skip
+    triangles: NDArray[np.int64] = corners[cut.places]
     return triangles
 
 

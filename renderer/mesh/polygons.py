@@ -1,13 +1,15 @@
 """Cutting polygons into triangles.
 
 A fan from the first corner is right for convex polygons and for every other one that the first corner sees
-whole; nearly all polygons in files are like that, and keep their fan. The rest lose one ear after the other
-(``ears``).
+whole; nearly all polygons in files are like that, and keep their fan. The rest are cut by mapbox_earcut, also
+polygons that touch themselves, such as those with a hole by a bridge. A cut counts if it is proven right: triangles
+that are all wound as the polygon and have its area cover it once.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,36 +24,61 @@ _TURNED_OVER = -1e-6
 _OUT_OF_PLANE = 0.05
 # Corners on one line, rounded to float64, make a triangle of less than this over the square of the extent.
 _FLAT = 1e-12
-# Cutting ears takes up to the square of the corners: some hundredths of a second for this many.
-_MOST_CORNERS = 4096
+_ROUNDED = 2.0**-52
+_TRIES = 8
 _BLOCK_CORNERS = 1 << 18
 
 
-def triangulate(positions: _Floats, corners: _Ints, starts: _Ints) -> _Ints:
-    """Triangles of polygons as (F, 3) places in ``corners``: those of a polygon together, polygons in their order.
+class Cut(NamedTuple):
+    """Polygons cut into triangles.
+
+    places : (F, 3) places in the corners, those of a polygon together, polygons in their order.
+    polygons : (F,) the polygon of each triangle, rising.
+    wrong : the polygons that keep a fan although it does not cover them once.
+    """
+
+    places: _Ints
+    polygons: _Ints
+    wrong: _Ints
+
+
+def triangulate(positions: _Floats, corners: _Ints, starts: _Ints) -> Cut:
+    """Triangles of polygons.
 
     positions : (V, 3), of any value.
     corners : rows of ``positions``; polygon p has corners[starts[p] : starts[p + 1]], at least three.
 
-    Polygon a b c d ... becomes abc, acd, ... where those triangles do not overlap, else as many others that do not
-    overlap and are wound as the polygon is. The fan stays for polygons that have no area, cross or touch themselves,
-    stray from a plane, have more than 4096 corners, or name a vertex that is not there or not finite.
+    Polygon a b c d ... becomes abc, acd, ... where those triangles do not overlap, else others that do not overlap and
+    are wound as the polygon is. The fan stays for polygons that have no area, and, as ``wrong`` ones, for those that
+    cross themselves or stray from a plane. What a polygon winds around twice is covered twice.
     """
     places = _fans(starts)
     lengths = np.diff(starts)
-    if not len(positions) or not (lengths > 3).any():
-        return places
-    finite = np.abs(positions[np.isfinite(positions)])
-    # Near 1, the products below neither overflow nor vanish.
-    near_one = np.ldexp(positions, -np.frexp(finite.max(initial=0.0))[1])
-    first_triangles = starts[:-1] - 2 * np.arange(len(lengths))
-    for rows in _rows_of_one_length(lengths):
-        around = starts[rows] + np.arange(lengths[rows[0]])[:, None]
-        suspects = np.flatnonzero(_fan_may_be_wrong(near_one, corners[around]))
-        for suspect, triangles in _cut_notched(near_one, corners[around[:, suspects]].T):
-            row = rows[suspects[suspect]]
-            places[first_triangles[row] : first_triangles[row] + len(triangles)] = starts[row] + triangles
-    return places
+    polygons = np.repeat(np.arange(len(lengths)), lengths - 2)
+    cuts: dict[int, _Ints | None] = {}
+    if len(positions) and (lengths > 3).any():
+        finite = np.abs(positions[np.isfinite(positions)])
+        # Near 1, the products below neither overflow nor vanish.
+        near_one = np.ldexp(positions, -np.frexp(finite.max(initial=0.0))[1])
+        for rows in _rows_of_one_length(lengths):
+            around = starts[rows] + np.arange(lengths[rows[0]])[:, None]
+            suspects = np.flatnonzero(_fan_may_be_wrong(near_one, corners[around]))
+            for suspect, triangles in _cut_notched(near_one, corners[around[:, suspects]].T):
+                row = int(rows[suspects[suspect]])
+                cuts[row] = None if triangles is None else starts[row] + triangles
+    wrong = np.array(sorted(row for row, triangles in cuts.items() if triangles is None), np.int64)
+    return Cut(*_replaced(places, polygons, cuts), wrong)
+
+
+def _replaced(places: _Ints, polygons: _Ints, cuts: dict[int, _Ints | None]) -> tuple[_Ints, _Ints]:
+    """Triangles and their polygons with the fans of some polygons replaced by their cuts, which may have fewer."""
+    own = {row: triangles for row, triangles in cuts.items() if triangles is not None}
+    if not own:
+        return places, polygons
+    kept = ~np.isin(polygons, list(own))
+    owners = np.concatenate([polygons[kept], *(np.full(len(t), row) for row, t in own.items())])
+    order = np.argsort(owners, kind="stable")
+    return np.concatenate([places[kept], *own.values()])[order], owners[order]
 
 
 def _fans(starts: _Ints) -> _Ints:
@@ -63,7 +90,7 @@ def _fans(starts: _Ints) -> _Ints:
 
 def _rows_of_one_length(lengths: _Ints) -> Iterator[_Ints]:
     """The polygons that a fan may be wrong for, a block of equally many corners at a time."""
-    rows = np.flatnonzero((lengths > 3) & (lengths <= _MOST_CORNERS))
+    rows = np.flatnonzero(lengths > 3)
     rows = rows[np.argsort(lengths[rows], kind="stable")]
     begin = 0
     for length, count in zip(*np.unique(lengths[rows], return_counts=True), strict=True):
@@ -75,7 +102,9 @@ def _rows_of_one_length(lengths: _Ints) -> Iterator[_Ints]:
 
 
 def _fan_may_be_wrong(positions: _Floats, polygons: _Ints) -> NDArray[np.bool_]:
-    """Whether a triangle of the fan is turned against the polygon's (Newell) normal, for polygons (corners, m)."""
+    """Whether a triangle of the fan is turned against the polygon's (Newell) normal, or there is none though triangles
+    have areas, for polygons (corners, m).
+    """
     there = ((polygons >= 0) & (polygons < len(positions))).all(axis=0)
     polygons = polygons if there.all() else np.where(there, polygons, 0)
     # By component: NumPy is several times faster along contiguous columns than along rows of three.
@@ -86,19 +115,19 @@ def _fan_may_be_wrong(positions: _Floats, polygons: _Ints) -> NDArray[np.bool_]:
             z[:-1] * x[1:] - x[:-1] * z[1:],
             x[:-1] * y[1:] - y[:-1] * x[1:],
         ]
-        along = sum(component * component.sum(axis=0) for component in cross)
-        wrong: NDArray[np.bool_] = there & (along < 0).any(axis=0)
+        normal = [component.sum(axis=0) for component in cross]
+        along = sum(component * total for component, total in zip(cross, normal, strict=True))
+        # Halves that cancel, as those of a bow-tie, have no normal to be turned against.
+        cancelled = ~np.any(normal, axis=0) & np.any(cross, axis=(0, 1))
+        wrong: NDArray[np.bool_] = there & ((along < 0).any(axis=0) | cancelled)
     return wrong
 
 
-def _cut_notched(positions: _Floats, polygons: _Ints) -> Iterator[tuple[int, _Ints]]:
-    """For each of the polygons (s, n) whose fan is wrong and whose ears can be cut, its row and its triangles.
+def _cut_notched(positions: _Floats, polygons: _Ints) -> Iterator[tuple[int, _Ints | None]]:
+    """For each of the polygons (s, n) whose fan is wrong, its row and its triangles; None where they cannot be cut.
 
-    The triangles are (n - 2, 3) numbers of the polygon's corners.
+    The triangles are (n - 2, 3) numbers of the polygon's corners, fewer where it goes there and back.
     """
-    # Imported here, because most files need no compiler.
-    from renderer.mesh import ears
-
     step = max(1, (1 << 22) // polygons.shape[1] ** 2)
     for begin in range(0, len(polygons), step):
         points = positions[polygons[begin : begin + step]]
@@ -107,19 +136,38 @@ def _cut_notched(positions: _Floats, polygons: _Ints) -> Iterator[tuple[int, _In
         before, after = points[:, 1:-1], points[:, 2:]
         cross = np.cross(before, after)
         normals = cross.sum(axis=1, keepdims=True)
-        normals = normals / np.linalg.norm(normals, axis=2, keepdims=True)
+        lengths = np.linalg.norm(normals, axis=2, keepdims=True)
+        normals = normals / np.where(lengths > 0.0, lengths, 1.0)
         sizes = np.linalg.norm(before, axis=2) * np.linalg.norm(after, axis=2)
-        notched = ((cross * normals).sum(axis=2) < _TURNED_OVER * sizes).any(axis=1)
-        planar = np.ptp((points * normals).sum(axis=2), axis=1) <= _OUT_OF_PLANE
+        turned = (cross * normals).sum(axis=2) < _TURNED_OVER * sizes
+        notched = turned.any(axis=1) | (lengths[:, 0, 0] == 0.0)
+        planar = (np.ptp((points * normals).sum(axis=2), axis=1) <= _OUT_OF_PLANE) & (lengths[:, 0, 0] > 0.0)
         flat = _projected(points, normals[:, 0])
-        for k in np.flatnonzero(notched & planar):
-            outline, count = np.ascontiguousarray(flat[k]), polygons.shape[1]
-            if not ears.is_simple(outline, np.argsort(np.minimum(outline, np.roll(outline, -1, axis=0))[:, 0])):
-                continue
-            links, triangles = np.empty((3, count), np.int64), np.empty((count - 2, 3), np.int64)
-            # Outlines with steps finer than _FLAT are rare, and are cut without a tolerance.
-            if ears.cut_ears(outline, _FLAT, links, triangles) or ears.cut_ears(outline, 0.0, links, triangles):
-                yield begin + int(k), triangles
+        for k in np.flatnonzero(notched):
+            yield begin + int(k), _cut_outline(flat[k]) if planar[k] else None
+
+
+def _cut_outline(outline: _Floats) -> _Ints | None:
+    """Triangles of an outline (n, 2) that is wound counter-clockwise; None where they do not cover it once."""
+    # Imported here, because few files have such polygons.
+    from mapbox_earcut import triangulate_float64
+
+    ends, fan = np.array([len(outline)], np.uint32), np.arange(1, len(outline) - 1)
+    whole = _doubled_areas(outline, np.stack([0 * fan, fan, fan + 1], axis=1))
+    # What is missing is more than the sums round.
+    room = _ROUNDED * len(outline) * np.abs(whole).sum()
+    for first in range(min(len(outline), _TRIES)):  # from another corner it may find what it did not
+        places = triangulate_float64(np.roll(outline, -first, axis=0), ends).reshape(-1, 3)
+        triangles: _Ints = (places.astype(np.int64) + first) % len(outline)
+        areas = _doubled_areas(outline, triangles)
+        if len(areas) and areas.min() >= -_FLAT and abs(areas.sum() - whole.sum()) <= room:
+            return triangles
+    return None
+
+
+def _doubled_areas(outline: _Floats, triangles: _Ints) -> _Floats:
+    a, b, c = np.moveaxis(outline[triangles], 1, 0)
+    return (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
 
 
 def _projected(points: _Floats, normals: _Floats) -> _Floats:

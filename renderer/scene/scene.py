@@ -22,7 +22,7 @@ from renderer.arguments.types import ArrayLike
 from renderer.arguments.up import UP_AXES, up_axis
 from renderer.errors import MeshError, NoSuchSceneError, SceneError, expect, expect_known
 from renderer.lazy import lazy
-from renderer.mesh.load import MESH_SUFFIXES, load_mesh
+from renderer.mesh.load import load_mesh, mesh_suffix
 from renderer.mesh.mesh import Mesh
 from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera, sample_offsets
 from renderer.scene.fields import Color, Fields, FiniteVector, Keys, SceneWarning, first_fault, shown, stated, thrice
@@ -544,7 +544,7 @@ def load_scene(path: str | os.PathLike[str], *, up: Literal["x", "y", "z"] | Non
     ('orthographic', ['ground', 'stone'], 1)
     """
     path = _scene_path(path)
-    if path.suffix.lower() in MESH_SUFFIXES:
+    if mesh_suffix(path):
         try:
             mesh = load_mesh(path)
         except MeshError as error:
@@ -568,7 +568,7 @@ def _up_of_mesh(up: str | None) -> str:
 def mesh_files(path: str | os.PathLike[str]) -> list[Path]:
     """The files of meshes that a scene file names, none of which is read. Raises ``SceneError`` for what is no TOML."""
     path = _scene_path(path)
-    if path.suffix.lower() in MESH_SUFFIXES:
+    if mesh_suffix(path):
         return [path]
     return [path.parent / entry["mesh"] for entry in _mesh_entries(_table(path))]
 

@@ -16,6 +16,7 @@ from renderer.arguments.types import ArrayLike
 from renderer.arguments.up import up_axis
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
+from renderer.mesh.ply import point_rows
 from renderer.octree import Octree
 from renderer.ordering.morton import order_along_curve
 from renderer.studies.grid import grid_points
@@ -113,11 +114,11 @@ def on_grid(
 
 
 def of_file(octree: Octree, path: Path, up: Literal["x", "y", "z"] = "z") -> Chosen:
-    """Points of an ``.npy`` file, (n, 3), or (n, 6) with normals. Points without normals look up.
+    """Points of an ``.npy``, ``.csv``, ``.xyz`` or ``.ply`` file, (n, 3), or (n, 6) with normals, else they look up.
 
     Studies find the faces of those that lie on the surface.
     """
-    array = _read_array("--points", path)
+    array = _rows_of_file("--points", path)
     good = array.ndim == 2 and array.shape[1] in (3, 6) and len(array) > 0
     expect(good, "--points", "an array (n, 3), or (n, 6) with normals, n >= 1", f"shape {array.shape} in {path}")
     points = np.ascontiguousarray(array[:, :3], np.float64)
@@ -162,6 +163,31 @@ def _read_array(argument: str, path: Path) -> NDArray[Any]:
     real = np.issubdtype(array.dtype, np.floating) or np.issubdtype(array.dtype, np.integer)
     expect(real, argument, "real numbers", f"{array.dtype} in {path}")
     return np.asarray(array)
+
+
+def _rows_of_file(argument: str, path: Path) -> NDArray[Any]:
+    """The rows of a file of points, by its suffix."""
+    suffix = path.suffix.lower()
+    if suffix == ".npy":
+        return _read_array(argument, path)
+    expect(suffix in (".csv", ".xyz", ".ply"), argument, "an .npy, .csv, .xyz or .ply file", str(path))
+    try:
+        if suffix == ".ply":
+            return point_rows(path.read_bytes())
+        return _text_rows(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise _unreadable(argument, path, error) from None
+    except ValueError as error:
+        raise ValueError(f"{argument}: expected rows of 3 or 6 numbers, got {path}: {error}") from None
+
+
+def _text_rows(text: str) -> NDArray[np.float64]:
+    """Numbers separated by spaces, commas or semicolons, a row a line; a first line of names is passed over."""
+    lines = [line.split("#")[0].replace(",", " ").replace(";", " ").split() for line in text.splitlines()]
+    rows = [line for line in lines if line]
+    if rows and any(word[:1].isalpha() and word.lower() not in ("nan", "inf") for word in rows[0]):
+        rows = rows[1:]
+    return np.array(rows, np.float64).reshape(len(rows), -1)
 
 
 def _unreadable(argument: str, path: Path, error: OSError) -> ValueError:

@@ -27,7 +27,11 @@ def points_within(it: "Traced", points: Floats) -> NDArray[np.bool_]:
         within[within] = octree.contains(some, rule="even-odd")
     elif len(octree.mesh.open_edges) == odd:
         # Turned one way, but for the edges where the mesh is open. It may be inwards.
-        within[within] = octree.contains(some, winding=True) | (octree.winding_number(some) < -0.5)
+        from renderer.inside.contains import contains  # which imports the compiler
+
+        mesh, tree = octree._built
+        outwards = contains(tree, mesh, some, True, "nonzero", True, octree.threads)
+        within[within] = outwards | (octree.winding_number(some) < -0.5)
     else:
         within[within] = _by_votes(octree, some)
     return within

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.errors import expect
-from renderer.mesh.load import MESH_SUFFIXES
+from renderer.mesh.load import mesh_suffix
 from renderer.mesh.mesh import Mesh
 from renderer.scene.camera import Camera, OrthographicCamera
 from renderer.scene.fields import Fields
@@ -125,7 +125,7 @@ def scene_text(shown: ShownScene, asked: SaveScene) -> SceneText:
     expect(path is not None, "save", "a scene file or a mesh file", "a scene that was made in Python")
     assert path is not None  # which mypy cannot tell
     expect(not shown.edited, "save", "the file as it was loaded", "one that was edited since")
-    if path.suffix.lower() in MESH_SUFFIXES:
+    if mesh_suffix(path):
         made = _changed_text(_made_for(shown.whole.scene, path.name), shown, asked)
         return SceneText(f"{path.stem}.toml", made, _diff("", made, path.name))
     written = _text_of(path)

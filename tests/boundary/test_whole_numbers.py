@@ -73,6 +73,7 @@ def test_a_whole_number_that_float64_does_not_hold_is_refused(
     given = {n: WHOLE[n] for n, p in known.items() if p.default is p.empty and n in WHOLE}
     given |= BESIDE.get(argument, {}) | ({"octree": OCTREE} if "octree" in known else {})
     given |= {"faces": [[0, 1, 2]]} if "faces" in known else {}
+    given |= {"rule": "even-odd"} if "rule" in known else {}  # by which a face and its back are closed
     given |= {"path": tmp_path / "a.ply"} if name == "save" else {}
     values = np.array(WHOLE[argument], np.int64)
     asked(**given | {argument: values})

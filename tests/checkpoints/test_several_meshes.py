@@ -155,7 +155,9 @@ class TestUp:
     ) -> None:
         files = [self.glb(folder, "a.glb"), "low.ply"]
         assert main(["study", "sky", *files, "-o", "a.npy"]) == 2
-        said = "octree-render: --up: expected an axis for .glb files, whose y is up, beside others, got none\n"
+        said = (
+            "octree-render: --up: expected an axis for .glb and .gltf files, whose y is up, beside others, got none\n"
+        )
         assert capsys.readouterr().err == said
         study("sky", *files, "-o", "a.npy", "--up", "z")
         study("sky", *files, "-o", "a.npy", "--hide", "a.glb")

@@ -211,7 +211,10 @@ def test_points_that_see_nothing_are_counted(tmp_path: Path, capsys: pytest.Capt
 def test_a_file_that_cannot_be_read_is_told_with_its_option(
     city: Path, tmp_path: Path, kind: str, option: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for missing, why in ((tmp_path / "none", "No such file or directory"), (tmp_path, "Is a directory")):
+    (tmp_path / "folder.npy").mkdir()
+    for missing, why in (
+        (tmp_path / "none.npy", "No such file or directory"), (tmp_path / "folder.npy", "Is a directory"),
+    ):  # fmt: skip
         assert main(["study", kind, str(city), option, str(missing), "-o", str(tmp_path / "a.npy"), "--quiet"]) == 2
         said = f"octree-render: {option}: expected a file that can be read, got {missing}: {why}\n"
         assert capsys.readouterr().err == said

@@ -68,7 +68,7 @@ def test_repairs_of_each_form(tmp_path: Path) -> None:
         (((row for row in BALL.vertices), BALL.faces), "vertices: expected an array, got a generator, which list.*"),
         (([[0, 0, 0], [1, 2]], [[0, 1, 2]]), "vertices: expected an array, got rows of different lengths"),
         (("a.stl", [[0, 1, 2]]), "vertices: expected .*"),
-        (("a.txt",), "a.txt: expected a suffix of .ply, .obj, .stl, .glb, got '.txt'"),
+        (("a.txt",), "a.txt: expected a suffix of .ply, .obj, .stl, .glb, .gltf, got '.txt'"),
     ],
 )
 def test_what_is_no_mesh_is_said(accelerator: Any, given: Any, says: str) -> None:

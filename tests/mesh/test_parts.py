@@ -15,6 +15,7 @@ from glb_bytes import Glb
 from renderer import BruteForce, Mesh, Octree, load_mesh
 from renderer.mesh import obj
 from renderer.mesh.load import parse_mesh
+from renderer.mesh.reading import Reading
 from renderer.mesh.shapes import box, icosphere
 
 pytestmark = pytest.mark.judges("Mesh.parts")
@@ -52,7 +53,7 @@ def test_groups_and_objects_of_obj(name: str, common: bool) -> None:
 
 def test_repairs_move_the_ends_of_parts() -> None:
     bad = VERTICES + "g a\nf 1 2 99\nf 1 2 3\ng b\nf 2 3 99 4\ng c\nf 2 3 4 5\n"
-    mesh = parse_mesh(bad.encode(), ".obj", [])
+    mesh = parse_mesh(bad.encode(), ".obj", Reading(repair=True))
     assert named(mesh)[0] == ("a", 0, 1) and named(mesh)[-1][0] == "c" and named(mesh)[-1][2] == len(mesh.faces)
     assert {tuple(face) for face in mesh.faces[mesh.parts[-1].faces].tolist()} == {(1, 2, 3), (1, 3, 4)}
 
@@ -121,7 +122,12 @@ def test_solids_of_stl(newline: str) -> None:
     mesh = parse_mesh(text.replace("\n", newline).encode(), ".stl")
     assert named(mesh) == [("Äußere Wand", 0, 3), ("", 3, 5), ("facet", 5, 6), ("empty", 6, 6)]
     bad = text.replace("vertex 1 0 0", "vertex nan 0 0", 1).encode()
-    assert named(parse_mesh(bad, ".stl", [])) == [("Äußere Wand", 0, 2), ("", 2, 4), ("facet", 4, 5), ("empty", 5, 5)]
+    assert named(parse_mesh(bad, ".stl", Reading(repair=True))) == [
+        ("Äußere Wand", 0, 2),
+        ("", 2, 4),
+        ("facet", 4, 5),
+        ("empty", 5, 5),
+    ]
     assert named(parse_mesh(f"solid one\n{FACET.format(1)}endsolid one\n".encode(), ".stl")) == [("", 0, 1)]
 
 

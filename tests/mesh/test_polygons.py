@@ -1,6 +1,5 @@
 """Polygons cut into triangles: right over notches, and the fan wherever that is right or nothing is."""
 
-import itertools
 import time
 from typing import Any
 
@@ -11,8 +10,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from renderer.mesh import ears, polygons
-from renderer.mesh.polygons import triangulate
+from renderer.mesh import polygons
+from renderer.mesh.polygons import Cut, triangulate
 
 pytestmark = pytest.mark.judges("load_mesh")
 
@@ -60,10 +59,16 @@ def placed(outline: Outline, frame: NDArray[np.float64] = FRAMES["flat"]) -> NDA
     return np.array([[x, y, 0.0] for x, y in outline]) @ frame.T
 
 
-def cut(*shapes: NDArray[np.float64]) -> list[list[int]]:
-    """The triangles of polygons that share no corner."""
+def cut_of(*shapes: NDArray[np.float64]) -> Cut:
+    """The cut of polygons that share no corner."""
     starts = np.cumsum([0, *map(len, shapes)])
-    return triangulate(np.concatenate(shapes), np.arange(starts[-1]), starts).tolist()
+    return triangulate(np.concatenate(shapes), np.arange(starts[-1]), starts)
+
+
+def cut(*shapes: NDArray[np.float64]) -> list[list[int]]:
+    found = cut_of(*shapes)
+    assert not len(found.wrong)
+    return found.places.tolist()
 
 
 def fan(corners: int, first: int = 0) -> list[list[int]]:
@@ -82,7 +87,8 @@ def assert_right(points: NDArray[np.float64], triangles: list[list[int]]) -> Non
     whole = doubled_areas(points, fan(len(points))).sum(axis=0)
     parts = doubled_areas(points, triangles) @ (whole / np.linalg.norm(whole))
     assert len(triangles) == len(points) - 2
-    assert parts.min() > 1e-9 and parts.sum() == pytest.approx(np.linalg.norm(whole), rel=1e-9)
+    # Corners on one line make triangles without area, but for rounding.
+    assert parts.min() > -1e-12 and parts.sum() == pytest.approx(np.linalg.norm(whole), rel=1e-9)
 
 
 @cases("frame", FRAMES)
@@ -153,7 +159,46 @@ def test_random_outlines_are_covered_once(corners: int, seed: int) -> None:
     assert_right(points, cut(points))
 
 
+# Polygons that touch themselves, and their areas.
+WINDOW = [(0, 0), (4, 0), (4, 4), (0, 4), (0, 0), (1, 1), (1, 3), (3, 3), (3, 1), (1, 1)]
+ANGLES = np.arange(1500) * np.pi / 750
+CIRCLE = [(float(x), float(y)) for x, y in np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)]
+TOUCHING = {
+    "hole by a bridge": (WINDOW, 12),
+    "pinched corner": ([(0, 0), (2, 2), (4, 0), (4, 4), (2, 2), (0, 4)], 8),
+    "corner on an edge": ([(0, 0), (4, 0), (4, 4), (2, 0), (0, 4), (1, 2)], 6),
+    "corner twice": ([*L_SHAPE[:3], L_SHAPE[2], *L_SHAPE[3:]], 3),
+    "edge there and back": ([(2, 1), (1, 1), (1, 2), (0, 2), (0, 0), (2, 0), (3, 0), (2, 0)], 3),
+    "folded back": ([(0, 0), (4, 0), (2, 0), (2, 1), (3, 2), (0, 3)], 6),
+    "ring of 3,000 corners": (
+        [*((2 * x, 2 * y) for x, y in CIRCLE), (2.0, 0.0), CIRCLE[0], *CIRCLE[:0:-1], CIRCLE[0]],
+        3 * 750 * np.sin(np.pi / 750),
+    ),
+}
+
+
+@cases("frame", FRAMES)
+@cases("name", TOUCHING)
+def test_polygons_that_touch_themselves_are_covered_once(name: str, frame: str) -> None:
+    """The wall with a window had the area of the wall, and rays hit in the window."""
+    outline, area = TOUCHING[name]
+    for shift in {0, 1, len(outline) // 2}:
+        points = np.roll(placed(outline, FRAMES[frame]), shift, axis=0)
+        for turned in (points, points[::-1]):
+            whole = doubled_areas(turned, fan(len(turned))).sum(axis=0)
+            parts = doubled_areas(turned, cut(turned)) @ (whole / np.linalg.norm(whole))
+            assert parts.min() >= -1e-12 and parts.sum() == pytest.approx(2 * area, rel=1e-9)
+
+
 PENTAGRAM = [star(5)[1::2][k] for k in (0, 2, 4, 1, 3)]
+
+
+@cases("outline", [[(0, 0), (1, 1), (1, 0), (0, 1)], [(0, 0), (2, 2), (2, 0), (0, 1)], PENTAGRAM])
+def test_polygons_that_cross_themselves_are_named(outline: Outline) -> None:
+    found = cut_of(placed(SQUARE), placed(outline), placed(L_SHAPE))
+    assert found.wrong.tolist() == [1]
+    assert found.places[found.polygons == 1].tolist() == fan(len(outline), 4)
+    assert_right(placed(L_SHAPE), (found.places[found.polygons == 2] - 4 - len(outline)).tolist())
 
 
 @cases(
@@ -161,60 +206,39 @@ PENTAGRAM = [star(5)[1::2][k] for k in (0, 2, 4, 1, 3)]
     [
         [(0, 0)] * 6,
         [(k, k) for k in (0, 1, 2, 3, 2, 1)],
-        [(0, 0), (1, 1), (1, 0), (0, 1)],
-        [(0, 0), (2, 2), (2, 0), (0, 1)],
-        np.roll(PENTAGRAM, 1, axis=0).tolist(),
-        [*L_SHAPE[:3], L_SHAPE[2], *L_SHAPE[3:]],
-        [(0, 0), (4, 0), (4, 4), (2, 0), (0, 4), (1, 2)],  # a corner on an edge
-        [(2, 1), (1, 1), (1, 2), (0, 2), (0, 0), (2, 0), (3, 0), (2, 0)],  # there and back
-        # A hole by a bridge.
-        [(0, 0), (4, 0), (4, 4), (0, 4), (0, 0), (1, 1), (1, 3), (3, 3), (3, 1), (1, 1)],
         *([*L_SHAPE[:k], (bad, 0.0), *L_SHAPE[k:]] for bad in (np.nan, np.inf, -np.inf) for k in (0, 3)),
-        [(x * y, y) for x, y in zip([1e308, -1e308] * 4, [1.0, -1.0, 2, 3, -5, 1, 7, 1], strict=True)],
     ],
 )
-def test_polygons_that_nothing_is_right_for_keep_their_fan(outline: Outline) -> None:
-    assert cut(placed(outline) if np.isfinite(outline).all() else np.array([[x, y, 0.0] for x, y in outline])) == fan(
-        len(outline)
-    )
+def test_polygons_without_area_and_without_numbers_keep_their_fan(outline: Outline) -> None:
+    assert cut(np.array([[x, y, 0.0] for x, y in outline])) == fan(len(outline))
 
 
-def test_a_pentagram_is_told_by_its_crossings(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without that check something else comes of a polygon that crosses itself: the tests above see it."""
-    crossing = placed([(0, 0), (6, 0), (6, 3), (2, 3), (2, -1), (3, -1), (3, 2), (5, 2), (5, 1), (0, 1)])
-    assert cut(crossing) == fan(len(crossing))
-    monkeypatch.setattr(ears, "is_simple", lambda outline, order: True)
-    assert cut(crossing) != fan(len(crossing))
-
-
-def test_an_outline_that_folds_back_onto_its_edge_is_not_simple() -> None:
-    """Its corner touches the edge before last, as no other pair of edges shows; from each corner, turned, mirrored."""
-    folded = np.array([(0, 0), (4, 0), (2, 0), (2, 1), (3, 2), (0, 3)], np.float64)
-    for turn, flip, begin, back in itertools.product(range(4), (1, -1), range(6), (1, -1)):
-        outline = np.ascontiguousarray(np.roll(folded * [flip, 1.0], begin, axis=0)[::back])
-        for _ in range(turn):
-            outline = np.ascontiguousarray(outline[:, ::-1] * [-1.0, 1.0])
-        order = np.argsort(np.minimum(outline, np.roll(outline, -1, axis=0))[:, 0])
-        assert not ears.is_simple(outline, order)
+def test_a_cut_that_does_not_cover_the_polygon_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the library gives: triangles turned over, one that is missing, none at all."""
+    good = np.array(cut(placed(L_SHAPE)), np.uint32)
+    for bad in (good[:, ::-1], good[:-1], good[:0]):
+        monkeypatch.setattr("mapbox_earcut.triangulate_float64", lambda *_, flat=bad: flat.ravel())
+        assert cut_of(placed(L_SHAPE)).wrong.tolist() == [0]
 
 
 def test_bent_polygons_keep_their_fan_slightly_bent_ones_are_cut() -> None:
     for height, kept in [(0.02, False), (0.9, True)]:
         points = placed(L_SHAPE) + np.outer([0, 1, 0, 1, 0, 1], [0, 0, height])
-        assert (cut(points) == fan(6)) == kept
+        found = cut_of(points)
+        assert (found.places.tolist() == fan(6)) == kept == bool(len(found.wrong))
 
 
 @cases("index", [-1, 6, 2**62, -(2**62)])
 def test_indices_out_of_range_keep_the_fan(index: int) -> None:
     corners = np.array([0, 1, 2, 3, 4, index, *range(6)])  # NumPy would take -1 for the last
-    triangles = triangulate(placed(L_SHAPE), corners, np.array([0, 6, 12]))
+    triangles = triangulate(placed(L_SHAPE), corners, np.array([0, 6, 12])).places
     assert triangles[:4].tolist() == fan(6)
     assert_right(placed(L_SHAPE), (triangles[4:] - 6).tolist())
 
 
 def test_no_vertices_and_no_polygons() -> None:
-    assert triangulate(np.empty((0, 3)), np.arange(4), np.array([0, 4])).tolist() == fan(4)
-    assert triangulate(np.empty((0, 3)), np.empty(0, np.int64), np.array([0])).shape == (0, 3)
+    assert triangulate(np.empty((0, 3)), np.arange(4), np.array([0, 4])).places.tolist() == fan(4)
+    assert triangulate(np.empty((0, 3)), np.empty(0, np.int64), np.array([0])).places.shape == (0, 3)
 
 
 def test_polygons_keep_their_order(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -239,23 +263,22 @@ def test_polygons_keep_their_order(monkeypatch: pytest.MonkeyPatch) -> None:
 @example([(0, 0), (2, 0), (1, 0), (1, 2)])
 def test_any_polygon_on_a_grid_is_covered_once_or_keeps_its_fan(corners: list[tuple[int, int]]) -> None:
     points = placed([(float(x), float(y)) for x, y in corners])
-    triangles = cut(points)
-    assert len(triangles) == len(points) - 2
-    if triangles != fan(len(points)):
-        assert_right(points, triangles)
-        edges = {frozenset((k, (k + 1) % len(points))) for k in range(len(points))}
-        assert edges <= {frozenset((t[k - 1], t[k])) for t in triangles for k in range(3)}
+    found = cut_of(points)
+    triangles = found.places.tolist()
+    if len(found.wrong) or triangles == fan(len(points)):
+        assert triangles == fan(len(points))
+        return
+    whole = doubled_areas(points, fan(len(points))).sum(axis=0)
+    parts = doubled_areas(points, triangles) @ np.sign(whole)
+    assert parts.min() >= 0.0 and parts.sum() == abs(whole).sum()
 
 
 def test_polygons_of_very_many_corners_end() -> None:
-    """Quiet, each takes under 2 s. Beyond the limit the fan stays."""
+    """Quiet, each takes under 0.1 s."""
     start = time.process_time()
-    for outline in (comb(600), [(y, x) for x, y in comb(600)][::-1], star(2000), spiral(80)):
+    for outline in (comb(600), [(y, x) for x, y in comb(600)][::-1], star(20_000), spiral(80)):
         points = placed(outline)
-        assert len(points) <= 4096
         assert_right(points, cut(points))
-    large = placed(star(2049))
-    assert cut(large) == fan(len(large))
     assert time.process_time() - start < 60
 
 
@@ -273,6 +296,6 @@ def test_a_million_squares_in_two_seconds() -> None:
     count = 1_000_000
     corners = np.tile(np.arange(4), count)
     start = time.process_time()
-    triangles = triangulate(placed(SQUARE), corners, np.arange(count + 1) * 4)
+    triangles = triangulate(placed(SQUARE), corners, np.arange(count + 1) * 4).places
     assert time.process_time() - start < 2
     assert corners[triangles].reshape(-1, 6).min(axis=0).tolist() == [0, 1, 2, 0, 2, 3]

@@ -88,7 +88,7 @@ def polygons() -> list[Any]:
         corners.append(np.stack([reach * np.cos(angle), reach * np.sin(angle), 0.0 * angle], axis=1))
         starts.append(starts[-1] + size)
     positions = np.concatenate(corners)
-    return [triangulate(positions, np.arange(len(positions)), np.array(starts))]
+    return list(triangulate(positions, np.arange(len(positions)), np.array(starts)))
 
 
 def too_small() -> list[Any]:

@@ -1,8 +1,10 @@
-"""Polygons of files, notched, with corners in line, crossing or touching themselves: their triangles, by whole numbers.
+"""Polygons of files, notched, with corners in line, touching themselves: their triangles, by whole numbers.
 
-Triangles that are all wound as a simple polygon is, and whose edges cancel but for its outline, cover it exactly once.
+Triangles that are all wound as a polygon is, have its area together, and lie over a point as often as the polygon winds
+around it, cover it as they should.
 """
 
+import warnings
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,6 +15,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from renderer.mesh.load import load_mesh
+from renderer.mesh.mesh import RepairWarning
 from validation.promises.row import row
 
 Whole = NDArray[np.int64]
@@ -21,8 +24,10 @@ Bools = NDArray[np.bool_]
 _GRID, _LENGTHS = 5, (4, 5, 6, 7, 8)
 # Beside polygons that reach so far, on no line through places of the grid, all that lies on it counts as flat at first.
 _FAR = 2**21 * np.array([(7, 5), (-5, 7), (-7, -6), (5, -9)])
-# The most corners of a polygon that is cut otherwise than into a fan.
-_MOST = 4096
+# More corners than fit a list that is searched from end to end.
+_MANY = 4096
+# So many points of each polygon's box, on places that are so much finer than those of corners.
+_POINTS, _UNIT = 100, 64
 # The axes of a plane as whole numbers: upright and turned, seen from in front and from behind, and tilted.
 _FRAMES = np.array([
     [(1, 0, 0), (0, 1, 0)], [(0, 0, 1), (0, 1, 0)], [(0, 1, 0), (0, 0, 1)], [(0, 0, 1), (1, 0, 0)],
@@ -37,34 +42,31 @@ def check_outlines(rng: Generator, count: int) -> list[dict[str, Any]]:
     """
     outlines = [outline for length in _LENGTHS for outline in _random(rng, count, length)]
     outlines += _long(rng)
-    triangles = _loaded(outlines, rng)
-    alike: dict[int, list[int]] = {}
-    for number, outline in enumerate(outlines):
-        alike.setdefault(len(outline), []).append(number)
-    covered, kept = [], []
-    for length, numbers in alike.items():
-        some, cut = np.stack([outlines[k] for k in numbers]), np.stack([triangles[k] for k in numbers])
-        fan = np.broadcast_to(_fan(length), cut.shape)
-        # The long ones are simple as they are made.
-        notched = ~_meetings(some)[0] if length <= max(_LENGTHS) else np.full(len(numbers), length <= _MOST)
-        notched &= ~_covers(some, fan, 0)
-        covered.append(_covers(some, cut, 1)[notched])
-        kept.append((cut == fan).all(axis=(1, 2))[~notched])
+    covered, kept, touching = [], [], []
+    for outline, triangles in zip(outlines, _loaded(outlines, rng), strict=True):
+        fan = _fan(len(outline))
+        points = _samples(outline, rng)
+        if _covers(outline, fan, points):
+            kept.append(np.array_equal(triangles, fan))
+        elif len(outline) > max(_LENGTHS) or not _meetings(outline[None])[0][0]:
+            covered.append(_covers(outline, triangles, points))
+        else:
+            touching.append(np.array_equal(triangles, fan) or _covers(outline, triangles, points))
     return [
-        row("triangles cover a notched polygon once, wound as it is", _JUDGE, np.concatenate(covered)),
-        row("a polygon keeps its fan where the fan is right or nothing is", _JUDGE, np.concatenate(kept)),
+        row("triangles cover a notched polygon once, wound as it is", _JUDGE, np.array(covered)),
+        row("a polygon keeps its fan where the fan is right", _JUDGE, np.array(kept)),
+        row("a polygon that touches itself is covered as it winds, or keeps its fan", _JUDGE, np.array(touching)),
     ]
 
 
 def _random(rng: Generator, count: int, length: int) -> Whole:
-    """Polygons on the grid, and those with two corners far from it. Of those that are not simple a few, mostly such
-    whose edges touch without crossing.
+    """Polygons on the grid, and those with two corners far from it, whose edges do not cross; of those that touch
+    themselves a few.
     """
     outlines = rng.integers(0, _GRID, (count, length, 2))
     outlines[::2, -2:] = rng.choice(_FAR, (len(outlines[::2]), 2))
     touching, crossing = _meetings(outlines)
-    others = outlines[touching & ~crossing][: count // 10], outlines[crossing][: count // 50]
-    return np.concatenate([outlines[~touching], *others])
+    return np.concatenate([outlines[~touching], outlines[touching & ~crossing][: count // 10]])
 
 
 def _long(rng: Generator) -> list[Whole]:
@@ -76,7 +78,7 @@ def _long(rng: Generator) -> list[Whole]:
         for way in (1, -1)
         for shift in range(0, len(shape), len(shape) // 7)
     ]
-    return [*some, _ridges(rng, _MOST), _ridges(rng, _MOST + 1)]
+    return [*some, _ridges(rng, _MANY), _ridges(rng, _MANY + 1)]
 
 
 def _ridges(rng: Generator, length: int) -> Whole:
@@ -107,39 +109,56 @@ def _loaded(outlines: list[Whole], rng: Generator) -> list[Whole]:
     for outline, frame, shift, scale in zip(outlines, frames, shifts, scales, strict=True):
         # Float64 holds these numbers: what is written is in one plane exactly.
         lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in (scale * (outline @ frame + shift)).tolist()]
-    lines += ["f " + " ".join(map(str, range(a + 1, b + 1))) for a, b in pairwise(starts)]
+    lines += [f"g {a}\nf " + " ".join(map(str, range(a + 1, b + 1))) for a, b in pairwise(starts)]
     with TemporaryDirectory(prefix="outlines-") as folder:
         path = Path(folder) / "outlines.obj"
         path.write_text("\n".join(lines), encoding="ascii")
-        faces = load_mesh(path).faces.astype(np.int64)
-    cuts = np.cumsum([len(outline) - 2 for outline in outlines])[:-1]
-    return [part - start for part, start in zip(np.split(faces, cuts), starts[:-1], strict=True)]
+        with warnings.catch_warnings():
+            # Polygons that cannot be cut are named; here they are judged.
+            warnings.simplefilter("ignore", RepairWarning)
+            mesh = load_mesh(path)
+    parts = {int(part.name): mesh.faces[part.faces].astype(np.int64) for part in mesh.parts}
+    return [parts.get(int(start), np.empty((0, 3), np.int64)) - start for start in starts[:-1]]
 
 
 def _fan(length: int) -> Whole:
     return np.array([(0, k, k + 1) for k in range(1, length - 1)])
 
 
-def _covers(outlines: Whole, triangles: Whole, least: int) -> Bools:
-    """Whether the triangles (m, n - 2, 3) of each outline (m, n, 2) are wound as it is, with twice an area of at least
-    ``least``, and all edges but those of the outline cancel.
+def _samples(outline: Whole, rng: Generator) -> Whole:
+    """Points of the outline's box, in units of which places are ``_UNIT`` apart, on no line through two corners."""
+    corners = _UNIT * outline
+    points = rng.integers(corners.min(axis=0), corners.max(axis=0) + 1, (_POINTS, 2))
+    if len(outline) > max(_LENGTHS):
+        return points[points[:, 0] % _UNIT != 0]  # of long ones no triangle is flat but upright
+    first, second = np.triu_indices(len(outline), 1)
+    sides = _turn(corners[first][:, None], corners[second][:, None], points[None])
+    return points[(sides != 0).all(axis=0)]
+
+
+def _covers(outline: Whole, triangles: Whole, points: Whole) -> bool:
+    """Whether triangles (m, 3) of an outline (n, 2) are wound as it is, have its area together, and lie over each point
+    as often as it winds around it.
     """
-    count, length, _ = outlines.shape
-    fan = np.broadcast_to(_fan(length), triangles.shape)
-    sign = np.sign(_doubled(outlines, fan).sum(axis=1))
-    wound = (_doubled(outlines, triangles) * sign[:, None] >= least).all(axis=1)
-    # With the outline backwards, there are as many edges each way.
-    ring = np.broadcast_to(np.stack([np.roll(np.arange(length), -1), np.arange(length)], 1), (count, length, 2))
-    edges = np.concatenate([triangles[:, :, [0, 1]], triangles[:, :, [1, 2]], triangles[:, :, [2, 0]], ring], axis=1)
-    there, back = edges[:, :, 0] * length + edges[:, :, 1], edges[:, :, 1] * length + edges[:, :, 0]
-    kept: Bools = wound & (np.sort(there, axis=1) == np.sort(back, axis=1)).all(axis=1)
-    return kept
+    corners = _UNIT * outline
+    areas, whole = _turn(*np.moveaxis(corners[triangles], 1, 0)), _turn(*np.moveaxis(corners[_fan(len(outline))], 1, 0))
+    sign = np.sign(whole.sum())
+    if (areas * sign < 0).any() or areas.sum() != whole.sum():
+        return False
+    over = np.zeros(len(points), np.int64)
+    for triangle in triangles[areas != 0]:
+        over += _winding(corners[triangle], points)
+    return bool((over == _winding(corners, points)).all())
 
 
-def _doubled(outlines: Whole, triangles: Whole) -> Whole:
-    """Twice the area of each triangle, positive where it turns left."""
-    a, b, c = (np.take_along_axis(outlines, triangles[:, :, k, None], axis=1) for k in range(3))
-    return _turn(a, b, c)
+def _winding(ring: Whole, points: Whole) -> Whole:
+    """How often a ring (n, 2) winds around each point."""
+    a, b = ring[:, None], np.roll(ring, -1, axis=0)[:, None]
+    side = _turn(a, b, points[None])
+    up = (a[..., 1] <= points[:, 1]) & (b[..., 1] > points[:, 1]) & (side > 0)
+    down = (b[..., 1] <= points[:, 1]) & (a[..., 1] > points[:, 1]) & (side < 0)
+    wound: Whole = up.sum(axis=0) - down.sum(axis=0)
+    return wound
 
 
 def _turn(a: Whole, b: Whole, c: Whole) -> Whole:

@@ -1,0 +1,222 @@
+"""Reading glTF 2.0: GLB, and JSON with its buffers in data URIs or files beside it.
+
+Own code, because trimesh reads quantized numbers as they stand, leaves out instances, skins and morph targets, and
+takes minutes for deep nodes, all in silence; pygltflib reads no arrays. The format: Khronos, "glTF 2.0 Specification".
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.errors import MeshError
+from renderer.mesh.accessors import Accessors
+from renderer.mesh.mesh import Mesh, give_parts
+from renderer.mesh.parts import parts_of
+from renderer.mesh.placements import Nodes
+from renderer.mesh.reading import Reading
+
+Floats = NDArray[np.float64]
+
+_JSON, _BINARY = b"JSON", b"BIN\0"
+_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+# What a file may require: what is read here, and the beginnings of names of extensions that move no vertex.
+_READ = ("KHR_mesh_quantization", "EXT_mesh_gpu_instancing")
+_HARMLESS = (
+    "KHR_materials_",
+    "KHR_technique",
+    "KHR_texture_",
+    "KHR_lights_",
+    "EXT_texture_",
+    "KHR_animation_",
+    "KHR_xmp",
+)
+_INSTANCING = "EXT_mesh_gpu_instancing"
+# What of a document has no place in a mesh.
+_LEFT_OUT = ("materials", "textures", "animations", "cameras")
+
+
+class _Corners(NamedTuple):
+    """The corners of a primitive: positions, and what else its file gives each."""
+
+    positions: Floats
+    faces: NDArray[np.int64]
+    attributes: dict[str, Any]
+
+
+def parse_gltf(content: bytes, reading: Reading | None = None, folder: Path | None = None) -> Mesh:
+    """All triangle meshes in a file's content, each where its nodes, instances and joints place it.
+
+    Skins stand as the file's nodes are, morph targets by the file's weights. Nodes with meshes are parts. Buffers in
+    files of their own are looked for in ``folder``.
+
+    Raises ``MeshError``, which does not know the file's name.
+    """
+    reading = reading or Reading()
+    document, binary = _document(content)
+    try:
+        _refuse_unread(document)
+        accessors = Accessors(document, _buffers(document, binary, folder))
+        with np.errstate(over="ignore", invalid="ignore"):  # what float64 cannot hold is rejected or repaired
+            return _mesh(document, accessors, reading)
+    except MeshError:
+        raise
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError) as error:
+        # Each entry of a malformed document may be of any type, or missing.
+        fault = " ".join(str(error).split())[:120]
+        raise MeshError(f"malformed glTF: {type(error).__name__}: {fault}") from error
+
+
+def _document(content: bytes) -> tuple[dict[str, Any], bytes | None]:
+    """The JSON document, and the binary chunk of a GLB."""
+    text, binary = content, None
+    if content[:4] == b"glTF":
+        version, length = (int.from_bytes(content[at : at + 4], "little") for at in (4, 8))
+        if version != 2:
+            raise MeshError(f"GLB: expected version 2, got version {version}")
+        if len(content) < length:
+            raise MeshError(f"truncated: expected {length} bytes, got {len(content)}")
+        chunks = dict(reversed(list(_chunks(content, length))))  # the first of a kind counts
+        text, binary = chunks.get(_JSON, b""), chunks.get(_BINARY)
+    if text is content and content.lstrip()[:1] != b"{":
+        raise MeshError(f"expected a first word 'glTF', got {content[:4]!r}")
+    try:
+        document = json.loads(text.decode("utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise MeshError(f"malformed glTF: its JSON: {str(error)[:120]}") from error
+    if not isinstance(document, dict):
+        raise MeshError(f"malformed glTF: expected a JSON object, got {type(document).__name__}")
+    return document, binary
+
+
+def _chunks(content: bytes, length: int) -> Iterator[tuple[bytes, bytes]]:
+    at = 12
+    while at + 8 <= length:
+        size = int.from_bytes(content[at : at + 4], "little")
+        if at + 8 + size > len(content):
+            raise MeshError(f"truncated: expected {at + 8 + size} bytes, got {len(content)}")
+        yield content[at + 4 : at + 8], content[at + 8 : at + 8 + size]
+        at += 8 + size
+
+
+def _refuse_unread(document: dict[str, Any]) -> None:
+    """Raise ``MeshError`` for a file that needs what is not read here."""
+    version = str((document.get("asset") or {}).get("version", "2.0"))
+    if isinstance(document.get("meshes"), dict) or version.startswith("1"):
+        raise MeshError(f"glTF: expected version 2.0, got version {version if version[:1] == '1' else '1.0'}")
+    for extension in document.get("extensionsRequired") or []:
+        if extension not in _READ and not str(extension).startswith(_HARMLESS):
+            raise MeshError(f"glTF: needs the extension {extension}, which is not read")
+
+
+def _buffers(document: dict[str, Any], binary: bytes | None, folder: Path | None) -> list[bytes]:
+    return [_buffer(number, buffer, binary, folder) for number, buffer in enumerate(document.get("buffers") or [])]
+
+
+def _buffer(number: int, buffer: dict[str, Any], binary: bytes | None, folder: Path | None) -> bytes:
+    uri = buffer.get("uri")
+    if uri is None and number == 0 and binary is not None:
+        return binary
+    if isinstance(uri, str) and uri.startswith("data:"):
+        _, _, data = uri.partition(",")
+        return base64.b64decode(unquote(data))
+    if not isinstance(uri, str) or folder is None or "://" in uri:
+        raise MeshError(f"glTF: expected the bytes of buffer {number}, got {str(uri)[:80]!r}")
+    try:
+        return (folder / unquote(uri)).read_bytes()
+    except OSError as error:
+        raise MeshError(f"glTF: buffer {number}, {uri[:80]!r}: cannot be read: {error.strerror}") from error
+
+
+def _mesh(document: dict[str, Any], accessors: Accessors, reading: Reading) -> Mesh:
+    nodes = Nodes(document, accessors)
+    meshes: list[Mesh] = []
+    names, counts = [], []
+    for number, node in nodes.with_meshes():
+        mesh = document["meshes"][node["mesh"]]
+        weights = node.get("weights") or mesh.get("weights") or []
+        before = sum(len(one.faces) for one in meshes)
+        for primitive in mesh["primitives"]:
+            meshes += _placed(primitive, weights, number, nodes, accessors, reading)
+        names.append(str(node.get("name") or mesh.get("name") or ""))
+        counts.append(sum(len(one.faces) for one in meshes) - before)
+    for attribute in ("normals", "colors", "texcoords"):
+        having = [getattr(one, attribute) is not None for one in meshes]
+        if any(having) and not all(having):
+            reading.note(f"left out, as only some primitives have them: {attribute}")
+    left_out = [key for key in _LEFT_OUT if document.get(key)]
+    if left_out and meshes:
+        reading.note("left out:", left_out)
+    return give_parts(Mesh.concatenate(meshes), parts_of(names, counts))
+
+
+def _placed(
+    primitive: dict[str, Any], weights: list[float], number: int, nodes: Nodes, accessors: Accessors, reading: Reading
+) -> Iterator[Mesh]:
+    """The meshes of a primitive, one for each instance of its node."""
+    corners = _corners(primitive, weights, accessors, reading)
+    if corners is None:
+        return
+    for matrix in nodes.matrices(number, primitive["attributes"]):
+        if matrix.ndim == 3:
+            moved = _skinned(corners, matrix)
+            yield reading.mesh(moved.positions, moved.faces, **moved.attributes)
+        else:
+            yield reading.mesh(corners.positions, corners.faces, **corners.attributes).transformed(matrix)
+
+
+def _corners(
+    primitive: dict[str, Any], weights: list[float], accessors: Accessors, reading: Reading
+) -> _Corners | None:
+    mode = primitive.get("mode", _TRIANGLES)
+    if mode not in (_TRIANGLES, _STRIP, _FAN):
+        reading.note("left out, as they have no surface: points and lines")
+        return None
+    given = primitive["attributes"]
+    positions = accessors.floats(given["POSITION"])
+    indices = primitive.get("indices")
+    order = np.arange(len(positions)) if indices is None else accessors.integers(indices)
+    normals = accessors.floats(given["NORMAL"]) if "NORMAL" in given else None
+    for weight, target in zip(weights, primitive.get("targets") or [], strict=False):
+        if weight and "POSITION" in target:
+            positions = positions + weight * accessors.floats(target["POSITION"])
+        if weight and "NORMAL" in target and normals is not None:
+            normals = normals + weight * accessors.floats(target["NORMAL"])
+    attributes: dict[str, Any] = {"normals": normals}
+    if "COLOR_0" in given:
+        attributes["colors"] = accessors.floats(given["COLOR_0"])[:, :3]
+    if "TEXCOORD_0" in given:
+        # From the lower left, where the file counts from the upper.
+        attributes["texcoords"] = accessors.floats(given["TEXCOORD_0"]) * [1.0, -1.0] + [0.0, 1.0]
+    return _Corners(positions, _triangles(order, mode), attributes)
+
+
+def _triangles(order: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
+    if mode == _TRIANGLES:
+        return order[: len(order) // 3 * 3].reshape(-1, 3)
+    if mode == _FAN:
+        first = np.broadcast_to(order[:1], max(len(order) - 2, 0))
+        return np.stack([first, order[1:-1], order[2:]], axis=1)
+    found = np.stack([order[:-2], order[1:-1], order[2:]], axis=1)
+    found[1::2] = found[1::2, [1, 0, 2]]  # every second one of a strip is turned
+    return found
+
+
+def _skinned(corners: _Corners, matrices: Floats) -> _Corners:
+    """The corners moved by a matrix each, (V, 4, 4)."""
+    moved = np.einsum("vij,vj->vi", matrices[:, :3, :3], corners.positions) + matrices[:, :3, 3]
+    attributes = dict(corners.attributes)
+    if attributes.get("normals") is not None:
+        # By the matrix of cofactors, which a singular matrix has too.
+        rows = matrices[:, :3, :3]
+        cofactors = np.stack([np.cross(rows[:, 1], rows[:, 2]), np.cross(rows[:, 2], rows[:, 0]),
+                              np.cross(rows[:, 0], rows[:, 1])], axis=1)  # fmt: skip
+        attributes["normals"] = np.einsum("vij,vj->vi", cofactors, attributes["normals"])
+    return _Corners(moved, corners.faces, attributes)
