@@ -8,7 +8,7 @@ from pathlib import Path
 from renderer.errors import expect
 
 SPLIT = "the rule that cuts cells of the octree (default: midpoint)"
-_SCENE = "a scene file (.toml), or a mesh file (.ply, .obj, .stl, .glb), which gets a camera, a sky and a floor"
+_SCENE = "a scene file (.toml), or a mesh file (.ply, .obj, .stl, .glb, .gltf), which gets a camera, a sky and a floor"
 _UP = "the axis of a mesh file that points up (default: y); a scene file has the key up"
 _WRITE_SCENE = "with a mesh file: write its scene to a new .toml file, which you can change"
 

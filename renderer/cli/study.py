@@ -16,7 +16,7 @@ SPLIT: Literal["sah"] = "sah"
 _KINDS = {"sky": "sky view factor", "sun": "hours of sun", "ao": "ambient occlusion"}
 # Options that one kind alone has, which are its function's.
 _OWN = {"sky": ("patches", "definition"), "sun": ("suns",), "ao": ("samples",)}
-_MESH = "mesh files (.ply, .obj, .stl, .glb); several are one mesh, and the summary has the values of each"
+_MESH = "mesh files (.ply, .obj, .stl, .glb, .gltf); several are one mesh, and the summary has the values of each"
 _UP = "the axis that points up; default: y for glTF, else z. kind sun: with it, suns below the horizon do not count"
 _HIDE = "leave out the mesh files of this name or pattern, such as 'tree*.obj'; may be given again"
 _VERTICES = "a value for each vertex: the mean of its faces' values, weighted by their areas"
