@@ -22,7 +22,6 @@ from renderer.jit import cache as kernel_store
 from renderer.jit.decorators import is_on_disk
 from renderer.jit.notice import QUIET_VARIABLE
 from renderer.mesh.mesh import Mesh
-from renderer.mesh.polygons import triangulate
 from renderer.mesh.shapes import icosphere
 from renderer.octree import BruteForce, Octree
 from renderer.picture.prepare import PreparedScene, prepare_scene
@@ -69,11 +68,6 @@ def _leave() -> None:
     octree = Octree.from_mesh(_TRIANGLE)
     octree.any_hit([0.1, 0.1, 0.0], [0.0, 0.0, 1.0], leaving=0)
     octree.visible([0.1, 0.1, 0.0], [0.1, 0.1, 1.0], leaving=0)
-
-
-def _cut() -> None:
-    notched = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [1.0, 0.5, 0.0], [0.0, 2.0, 0.0]])
-    triangulate(notched, np.array([1, 2, 3, 0]), np.array([0, 4]))
 
 
 def _contain() -> None:
@@ -144,7 +138,6 @@ _QUERIES = (
     Part("steps of a search", _count_steps),
     Part("winding numbers", _wind),
     Part("studies", _study),
-    Part("concave polygons", _cut),
 )
 _PICTURES = (Part("pictures", _render), Part("the viewer", _view))
 # By the name of the command's option.

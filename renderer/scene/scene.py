@@ -22,7 +22,7 @@ from renderer.arguments.types import ArrayLike
 from renderer.arguments.up import UP_AXES, up_axis
 from renderer.errors import MeshError, NoSuchSceneError, SceneError, expect, expect_known
 from renderer.lazy import lazy
-from renderer.mesh.load import load_mesh, mesh_suffix
+from renderer.mesh.load import MESH_SUFFIXES, load_mesh, mesh_suffix
 from renderer.mesh.mesh import Mesh
 from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera, sample_offsets
 from renderer.scene.fields import Color, Fields, FiniteVector, Keys, SceneWarning, first_fault, shown, stated, thrice
@@ -517,8 +517,8 @@ def load_scene(path: str | os.PathLike[str], *, up: Literal["x", "y", "z"] | Non
     Parameters
     ----------
     path : path
-        A ``.toml`` file, or a mesh file (.ply, .obj, .stl, .glb). A camera that sees all of the mesh, two lights and a
-        floor are then chosen to fit; ``octree-render render --write-scene`` writes them as a scene file.
+        A ``.toml`` file, or a mesh file (.ply, .obj, .stl, .glb, .gltf). A camera that sees all of the mesh, a sky and
+        a floor are then chosen to fit; ``octree-render render --write-scene`` writes them as a scene file.
     up : {"x", "y", "z"}, optional
         The axis of a mesh file that points up, by default "y". A scene file has the key ``up`` instead.
 
@@ -582,13 +582,22 @@ def _scene_path(path: object) -> Path:
 
 def _table(path: Path) -> dict[str, Any]:
     """The content of a scene file."""
+    other = f"{path}: expected a scene file (.toml) or a mesh file ({', '.join(MESH_SUFFIXES)}), got {path.suffix!r}"
+    named = path.suffix.lower() == ".toml"
     try:
-        return tomllib.loads(read_whole(path).decode("utf-8-sig"))
+        table = tomllib.loads(read_whole(path).decode("utf-8-sig"))
+        if not named and "camera" not in table:
+            raise SceneError(other)
+        return table
     except FileNotFoundError as error:
         raise NoSuchSceneError(f"{path}: cannot be read: {error.strerror}") from None
     except OSError as error:
         raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
+    except SceneError:
+        raise
     except (ValueError, RecursionError) as error:  # not only TOML's: bad UTF-8, too many digits
+        if not named and path.suffix:
+            raise SceneError(other) from None
         raise SceneError(f"{path}: expected TOML, got a syntax error: {error}") from None
 
 

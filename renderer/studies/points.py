@@ -185,9 +185,9 @@ def _text_rows(text: str) -> NDArray[np.float64]:
     """Numbers separated by spaces, commas or semicolons, a row a line; a first line of names is passed over."""
     lines = [line.split("#")[0].replace(",", " ").replace(";", " ").split() for line in text.splitlines()]
     rows = [line for line in lines if line]
-    if rows and any(word[:1].isalpha() and word.lower() not in ("nan", "inf") for word in rows[0]):
+    if rows and all(word[:1].isalpha() and word.lower() not in ("nan", "inf") for word in rows[0]):
         rows = rows[1:]
-    return np.array(rows, np.float64).reshape(len(rows), -1)
+    return np.array(rows, np.float64) if rows else np.empty((0, 3))
 
 
 def _unreadable(argument: str, path: Path, error: OSError) -> ValueError:

@@ -43,7 +43,7 @@ def test_the_page_shows_both_pictures_and_the_difference(page: Viewer) -> None:
     assert f"{told['identical']:,} of {told['pixels']:,} pixels are identical" in text
     assert page.page.is_visible("#legend") and page.page.is_hidden("#divider")
     page.page.locator("#stage").press("x")
-    page.page.evaluate("() => (viewer.panel.fields.pair.value = 'brute')")
+    page.page.select_option("[name=pair]", "brute")
     _, told = kept(page)
     assert told["identical"] == told["pixels"]
     assert f"All {told['pixels']:,} pixels are identical to the bit" in page.page.inner_text("#proof output")

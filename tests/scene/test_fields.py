@@ -22,6 +22,7 @@ from renderer import (
     SceneError,
     SceneObject,
     Sky,
+    load_scene,
 )
 from renderer.mesh.shapes import box
 
@@ -251,3 +252,11 @@ def test_a_field_refuses_other_values_and_its_error_names_it(model: Any, name: s
         # Where a record is wrong as a whole, the error's words name what is.
         assert said.startswith(f"{model.__name__}: ") and re.search(rf"\b{name}\b", said), (given, said)
         assert "\n" not in said
+
+
+@pytest.mark.parametrize("content", [b"", b"\xff\xfe\0", b"a = 1\n"])
+def test_a_file_of_another_kind_is_named_by_its_suffix(content: bytes, tmp_path: Path) -> None:
+    """It was a scene without a camera."""
+    (tmp_path / "a.fbx").write_bytes(content)
+    with pytest.raises(SceneError, match=r"a\.fbx: expected a scene file \(\.toml\) or a mesh file .*, got '\.fbx'"):
+        load_scene(tmp_path / "a.fbx")

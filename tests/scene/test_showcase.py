@@ -81,7 +81,7 @@ def test_only_of_a_mesh_a_scene_is_written(tmp_path: Path, capsys: Any) -> None:
 
 
 def test_what_is_neither_is_said_in_one_line(tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match="expected TOML"):
+    with pytest.raises(SceneError, match="expected a scene file"):
         (tmp_path / "a.txt").write_text("no scene")
         load_scene(tmp_path / "a.txt")
 
