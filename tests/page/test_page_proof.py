@@ -87,8 +87,12 @@ def test_nothing_of_a_proof_stands_for_another_view(page: Viewer) -> None:
     """A verdict belongs to one camera, one pair and one scene."""
     page.choose("proof")
     assert page.page.inner_text("#proof output")
-    page.page.evaluate("() => { viewer.camera.orbit(0.3, 0); viewer.moved(); }")
-    assert page.page.inner_text("#proof output") == ""
+    said = """() => {
+        viewer.camera.orbit(0.3, 0);
+        viewer.moved();
+        return document.querySelector("#proof output").value;  // at once, before another is computed
+    }"""
+    assert page.page.evaluate(said) == ""
     kept(page)
     assert page.page.inner_text("#proof output")
     page.page.evaluate("() => viewer.reset()")
