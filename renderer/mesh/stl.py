@@ -106,11 +106,13 @@ def _text_corners(text: str, reading: Reading) -> NDArray[np.float64]:
         if not body.rstrip().endswith("endfacet"):
             raise MeshError(f"truncated: {begun} solids begin, {ended} end")
         reading.note(f"{begun} solids begin, {ended} end")
-    body, without = re.subn(r"\bfacet\s+(?=outer\b)", "facet normal 0 0 0 ", body)
-    if without:
-        reading.note("facets without a normal")
-    words = body.split()
-    size = len(_FACET)
+    words, size = body.split(), len(_FACET)
+    second = words[1::size]
+    if second.count("normal") < len(second):
+        body, without = re.subn(r"\bfacet\s+(?=outer\b)", "facet normal 0 0 0 ", body)
+        words = body.split()
+        if without:
+            reading.note("facets without a normal")
     face_count, left_over = divmod(len(words), size)
     _check_words(words, face_count)
     if left_over:
