@@ -292,6 +292,7 @@ def test_a_ray_is_seen_from_the_side_beside_its_card(viewer: Viewer) -> None:
     viewer.settled("octree")
     viewer.page.mouse.click(viewer.centre()[0] + 40, viewer.centre()[1] + 30)
     viewer.page.click("#card >> text=View from the side")
+    viewer.settled("octree")
     card, frame = (viewer.page.locator(name).bounding_box() for name in ("#card", "#frame"))
     left, right = card["x"] + card["width"], frame["x"] + frame["width"]
     start, end = np.array(viewer.page.evaluate("() => [viewer.rays.pick.path[0].start, viewer.rays.pick.path[0].end]"))

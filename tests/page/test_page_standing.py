@@ -9,16 +9,17 @@ import pytest
 from PIL import Image as Pillow
 from viewer_page import MODELS, Viewer, served
 
-# The server sends a next picture once the last is acknowledged: so long as the page does not, it stays at that pass.
-HOLD = """() => {
+# What the page sends of a kind waits. The server sends a next picture once the last is acknowledged: so long as "ack"
+# waits, it stays at that pass.
+HOLD = """(kind) => {
     const { connection } = window.viewer, send = connection.send;
-    window.acks = [];
-    connection.send = (message) => message.type === "ack" ? window.acks.push(message) : send.call(connection, message);
+    window.held = [];
+    connection.send = (message) => message.type === kind ? window.held.push(message) : send.call(connection, message);
 }"""
 GO_ON = """() => {
     const { connection } = window.viewer;
     delete connection.send;
-    window.acks.forEach((message) => connection.send(message));
+    window.held.forEach((message) => connection.send(message));
 }"""
 # Notes after each drawing whether the traced picture is seen, and how wide it is; null where WebGL's model is.
 WATCH = """() => {
@@ -45,9 +46,9 @@ def test_the_first_traced_picture_stands_until_a_finer_one_comes(odd: Viewer) ->
     """Its sides are whole pixels, so its shape is not quite the stage's; it was dropped for that, for seconds."""
     width, height = (odd.camera[k] for k in ("w", "h"))
     assert 128 * height != round(128 * height / width) * width
-    odd.page.evaluate(HOLD)
+    odd.page.evaluate(HOLD, "ack")
     odd.page.evaluate("() => { viewer.camera.orbit(0.4, 0); viewer.moved(); }")
-    odd.page.wait_for_function("() => window.acks.some(({ seq, step }) => seq === viewer.seq && step === 0)")
+    odd.page.wait_for_function("() => window.held.some(({ seq, step }) => seq === viewer.seq && step === 0)")
     odd.page.evaluate(WATCH)
     odd.page.wait_for_timeout(STALE)
     odd.page.evaluate("() => viewer.draw()")
@@ -60,8 +61,10 @@ def test_the_first_traced_picture_stands_until_a_finer_one_comes(odd: Viewer) ->
 def test_brute_force_begins_with_the_octrees_picture(odd: Viewer) -> None:
     """It is the same one, and a label says which; WebGL's model stood there for the seconds that brute force took."""
     odd.page.evaluate(WATCH)
+    odd.page.evaluate(HOLD, "view")
     odd.page.evaluate("() => viewer.setMode('brute')")
     odd.page.wait_for_selector("#until:not([hidden])")
+    odd.page.evaluate(GO_ON)
     odd.settled("brute")
     assert odd.page.is_hidden("#until") and set(odd.page.evaluate(WATCHED)) == {odd.camera["w"]}
 
@@ -139,9 +142,9 @@ def test_a_cancelled_view_leaves_only_a_picture_that_is_true_of_it(viewer: Viewe
 
 def test_a_picture_that_is_not_finished_is_saved_when_it_is(odd: Viewer, tmp_path: Path) -> None:
     """The coarse one that stood there was written, without a word."""
-    odd.page.evaluate(HOLD)
+    odd.page.evaluate(HOLD, "ack")
     odd.page.evaluate("() => { viewer.camera.orbit(0.4, 0); viewer.moved(); }")
-    odd.page.wait_for_function("() => window.acks.some(({ seq, step }) => seq === viewer.seq && step === 0)")
+    odd.page.wait_for_function("() => window.held.some(({ seq, step }) => seq === viewer.seq && step === 0)")
     odd.page.click("#save-picture")
     assert "when it is finished" in odd.page.inner_text("#notices")
     with odd.page.expect_download() as saved:
