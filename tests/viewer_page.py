@@ -16,6 +16,7 @@ from typing import Any, ClassVar, Self
 from urllib.parse import urlsplit
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -34,6 +35,19 @@ FLAGS = [
 MODELS = Path(__file__).parent.parent / "scenes" / "models"
 # Milliseconds. A first picture of another kind may compile its kernels, on a machine with much other work.
 PATIENCE = 240_000
+
+
+@contextmanager
+def chromium() -> Iterator[Any]:
+    """Chromium, without a window; the test is skipped where it cannot start."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
+    if CHROMIUM is None:
+        pytest.skip("no Chromium: apt-get install chromium")
+    with playwright.sync_playwright() as engine:
+        started = engine.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield started
+        started.close()
+
 
 SCENE = f"""
 ambient = 0.1

@@ -14,7 +14,7 @@ from renderer.errors import expect
 from renderer.inside.crossings import ON_FACE, UNDECIDED_COUNT, count_crossings
 from renderer.inside.rational import crossings_of
 from renderer.inside.winding import exceeds_half
-from renderer.mesh.mending import cancels
+from renderer.mesh.mending import enclosed_share
 from renderer.mesh.mesh import Mesh
 from renderer.ordering.cells import search_in_order
 from renderer.trace.layout import Tree
@@ -49,11 +49,6 @@ def contains(
 
 def _check_closed(mesh: Mesh, rule: str) -> None:
     """Raise ``ValueError`` for a mesh that has no inside."""
-    if rule == "nonzero" and cancels(mesh.vertices, mesh.faces):
-        expected = (
-            "a closed mesh whose faces are turned one way, or rule='even-odd'; Mesh.without_duplicates() mends it"
-        )
-        expect(False, "mesh", expected, f"{len(mesh.faces)} faces, each as often one way round as the other")
     edges = mesh.open_edges if rule == "nonzero" else mesh.odd_edges
     if len(edges):
         start, end = mesh.vertices[edges[0]].tolist()
@@ -61,14 +56,17 @@ def _check_closed(mesh: Mesh, rule: str) -> None:
         if rule == "nonzero":
             expected = "a closed mesh whose faces are turned one way, or rule='even-odd' or winding=True"
         expect(False, "mesh", expected, f"{len(edges)} open edges, the first from {start} to {end}")
+    if rule == "nonzero":
+        expected = (
+            "a closed mesh whose faces are turned one way, or rule='even-odd'; Mesh.without_duplicates() mends it"
+        )
+        got = f"{len(mesh.faces)} faces, each as often one way round as the other"
+        expect(mesh.is_closed(), "mesh", expected, got)
 
 
 def is_inside_out(mesh: Mesh) -> bool:
     """Whether the mesh, which may have holes, encloses less than nothing, by more than a hundredth of its box."""
-    lower, upper = mesh.bounds
-    sides = np.where(upper > lower, upper / 2 - lower / 2, 1.0)
-    a, b, c = np.moveaxis((mesh.triangles - (lower / 2 + upper / 2)) / sides, 1, 0)  # within a box from -1 to 1
-    return float(np.einsum("ni,ni->n", a, np.cross(b, c)).sum()) / 6.0 < -0.08
+    return enclosed_share(mesh.bounds, mesh.triangles) < -0.01
 
 
 def _counted(tree: Tree, mesh: Mesh, points: NDArray[np.float64], threads: int) -> NDArray[np.int32]:

@@ -1,4 +1,4 @@
-"""Edges of a mesh that bound nothing: those at which its surface is open."""
+"""Places of vertices, and the edges of a mesh that bound nothing: those at which its surface is open."""
 
 from typing import Any
 
@@ -25,15 +25,21 @@ def open_edges(vertices: NDArray[np.float64], faces: NDArray[np.int32], oriented
     return np.stack([start[found], end[found]], axis=1).astype(np.int64)
 
 
+def places(vertices: NDArray[np.float64]) -> NDArray[np.int64]:
+    """A number for each vertex that those at the same place share."""
+    # 0.0 added, so that -0.0 is the same place.
+    # rule: zero-without-sign
+    rows = np.ascontiguousarray(vertices + 0.0).view("V24").ravel()
+    return np.unique(rows, return_inverse=True)[1].ravel().astype(np.int64)
+
+
 def sides(
     vertices: NDArray[np.float64], faces: NDArray[np.integer[Any]]
-) -> tuple[NDArray[np.integer[Any]], NDArray[np.integer[Any]], NDArray[np.int64]]:
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Of each side (f, 3) of each face the places where it starts and ends, and a number that its edge alone has.
 
     Places and edges are told by position: what lies at one place has one number.
     """
-    # 0.0 added, so that -0.0 is the same place.
-    # rule: zero-without-sign
-    place = np.unique(np.ascontiguousarray(vertices + 0.0).view("V24").ravel(), return_inverse=True)[1].ravel()
+    place = places(vertices)
     start, end = place[faces], place[np.roll(faces, -1, axis=1)]
-    return start, end, np.minimum(start, end).astype(np.int64) * len(vertices) + np.maximum(start, end)
+    return start, end, np.minimum(start, end) * len(vertices) + np.maximum(start, end)

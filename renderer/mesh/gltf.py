@@ -22,6 +22,7 @@ from renderer.mesh.mesh import Mesh, give_parts
 from renderer.mesh.parts import parts_of
 from renderer.mesh.placements import Nodes
 from renderer.mesh.reading import Reading
+from renderer.system.files import read_whole
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +39,6 @@ _HARMLESS = (
     "KHR_animation_",
     "KHR_xmp",
 )
-_INSTANCING = "EXT_mesh_gpu_instancing"
 # What of a document has no place in a mesh.
 _LEFT_OUT = ("materials", "textures", "animations", "cameras")
 
@@ -130,7 +130,7 @@ def _buffer(number: int, buffer: dict[str, Any], binary: bytes | None, folder: P
     if not isinstance(uri, str) or folder is None or "://" in uri:
         raise MeshError(f"glTF: expected the bytes of buffer {number}, got {str(uri)[:80]!r}")
     try:
-        return (folder / unquote(uri)).read_bytes()
+        return read_whole(folder / unquote(uri))
     except OSError as error:
         raise MeshError(f"glTF: buffer {number}, {uri[:80]!r}: cannot be read: {error.strerror}") from error
 
@@ -142,11 +142,11 @@ def _mesh(document: dict[str, Any], accessors: Accessors, reading: Reading) -> M
     for number, node in nodes.with_meshes():
         mesh = document["meshes"][node["mesh"]]
         weights = node.get("weights") or mesh.get("weights") or []
-        before = sum(len(one.faces) for one in meshes)
+        first = len(meshes)
         for primitive in mesh["primitives"]:
             meshes += _placed(primitive, weights, number, nodes, accessors, reading)
         names.append(str(node.get("name") or mesh.get("name") or ""))
-        counts.append(sum(len(one.faces) for one in meshes) - before)
+        counts.append(sum(len(one.faces) for one in meshes[first:]))
     for attribute in ("normals", "colors", "texcoords"):
         having = [getattr(one, attribute) is not None for one in meshes]
         if any(having) and not all(having):

@@ -85,22 +85,22 @@ def load_mesh(
         mesh = parse_mesh(content, suffix, reading, folder)
     except MeshError as error:
         raise MeshError(f"{shown}: {error}") from error
-    said = [str(one) for one in (reading.total, *reading.notes) if one]
+    said = reading.said
     if said and strict:
-        raise MeshError(f"{shown}: {'; '.join(said)}")
+        raise MeshError(f"{shown}: {said}")
     if said:
-        warnings.warn(f"{shown}: {'; '.join(said)}", RepairWarning, stacklevel=2)
+        warnings.warn(f"{shown}: {said}", RepairWarning, stacklevel=2)
     stem = "" if folder is None else Path(str(shown).removesuffix(".gz")).stem
     return replace(mesh, name=stem if name is None else name)
 
 
 def _read(path: str | os.PathLike[str] | bytes | BinaryIO) -> tuple[object, str, bytes, Path | None]:
     """What messages call a file, the suffix of its kind, its content, and the folder where it lies."""
-    if isinstance(path, bytes | bytearray | memoryview) or hasattr(path, "read"):
-        content = bytes(path) if isinstance(path, bytes | bytearray | memoryview) else path.read()
-        if not isinstance(content, bytes):
-            raise MeshError(f"path: expected a file opened as binary, got {type(content).__name__} from it")
-        content = _unpacked(content)
+    given = path.read() if hasattr(path, "read") else path
+    if given is not path or isinstance(given, bytes | bytearray | memoryview):
+        if not isinstance(given, bytes | bytearray | memoryview):
+            raise MeshError(f"path: expected a file opened as binary, got {type(given).__name__} from it")
+        content = _unpacked(bytes(given))
         return "mesh", _kind(content), content, None
     try:
         file = as_path("path", path)
@@ -162,8 +162,7 @@ def parse_mesh(content: bytes, suffix: str, reading: Reading | None = None, fold
         content = content.removeprefix(BOM_UTF8)
     mesh = parse_gltf(content, reading, folder) if suffix in Y_UP else _PARSERS[suffix](content, reading)
     if len(mesh.faces) == 0:
-        said = "; ".join(str(one) for one in (reading.total, *reading.notes) if one)
-        raise MeshError(f"holds no good faces: {said}" if said else "holds no faces")
+        raise MeshError(f"holds no good faces: {reading.said}" if reading.said else "holds no faces")
     return mesh
 
 

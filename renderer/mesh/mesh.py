@@ -17,7 +17,7 @@ from renderer.lazy import lazy
 from renderer.mesh.crease import Split
 from renderer.mesh.edges import open_edges
 from renderer.mesh.foreign import TriangleMesh, attributes_of, has_own_normals, has_triangles
-from renderer.mesh.mending import cancels, joined, twins
+from renderer.mesh.mending import cancels, enclosed_share, joined, twins
 from renderer.mesh.parts import Part, parts_of
 from renderer.mesh.values import Owner
 
@@ -549,7 +549,15 @@ class Mesh:
         >>> box().is_closed(), grid().is_closed()
         (True, False)
         """
-        return len(self.faces) > 0 and len(self.open_edges) == 0 and not cancels(self.vertices, self.faces)
+        return len(self.faces) > 0 and len(self.open_edges) == 0 and not self._cancels
+
+    @lazy
+    def _cancels(self) -> bool:
+        """Whether each face is there as often one way round as the other."""
+        # Faces that cancel enclose nothing; what their sum rounds is far less than this share of the box.
+        if abs(enclosed_share(self.bounds, self.triangles)) > 1e-6:
+            return False
+        return cancels(self.vertices, self.faces)
 
     @lazy
     def open_edges(self) -> NDArray[np.int64]:

@@ -94,9 +94,7 @@ def _parts(content: _Content, polygons: NDArray[np.int64], reading: Reading) -> 
 
 def _mesh(content: _Content, reading: Reading) -> Mesh:
     cut = triangulate(content.positions, content.corners[:, 0], content.starts)
-    if len(cut.wrong):
-        reading.note("polygons that cross themselves or are far from flat are cut as fans, by the number of the face:",
-                     (cut.wrong + 1).tolist())  # fmt: skip
+    reading.cut((cut.wrong + 1).tolist(), "the number of the face")
     mesh = _split(content, content.corners[cut.places.ravel()], reading)
     return give_parts(mesh, _parts(content, cut.polygons, reading))
 
@@ -342,7 +340,7 @@ def _read_statement(keyword: str, words: list[str], statements: _Statements) -> 
         case "f":
             corners = [_corner(word, statements) for word in words]
             if len(words) < 3:
-                statements.reading.note("left out: faces of fewer than three corners")
+                statements.reading.no_polygon()
                 return
             statements.corners += corners
             statements.lengths.append(len(words))

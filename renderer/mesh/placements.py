@@ -22,6 +22,7 @@ class Nodes:
     def __init__(self, document: dict[str, Any], accessors: Accessors) -> None:
         self._document, self._accessors = document, accessors
         self._nodes: list[dict[str, Any]] = document.get("nodes") or []
+        self._above = self._parents()
         self._world = self._places()
         self._shown = self._reached(self._roots())
 
@@ -48,8 +49,22 @@ class Nodes:
         chosen = self._document.get("scene", 0)
         if scenes:
             return list(scenes[chosen].get("nodes") or [])
-        below = {child for node in self._nodes for child in node.get("children") or []}
-        return [number for number in range(len(self._nodes)) if number not in below]
+        return self._uppermost()
+
+    def _uppermost(self) -> list[int]:
+        return [number for number in range(len(self._nodes)) if number not in self._above]
+
+    def _parents(self) -> dict[int, int]:
+        """The node above each one that is below another."""
+        above: dict[int, int] = {}
+        for number, node in enumerate(self._nodes):
+            for child in node.get("children") or []:
+                if not isinstance(child, int) or not 0 <= child < len(self._nodes):
+                    raise MeshError(f"glTF: node {number}: expected children of {len(self._nodes)} nodes, got {child}")
+                if child in above:
+                    raise MeshError("glTF: expected each node below at most one other, got one below two")
+                above[child] = number
+        return above
 
     def _reached(self, roots: list[int]) -> list[int]:
         """The nodes below ``roots``, each after the one that it is below."""
@@ -62,14 +77,7 @@ class Nodes:
 
     def _places(self) -> dict[int, Floats]:
         """The matrix of each node to the world."""
-        above: dict[int, int] = {}
-        for number, node in enumerate(self._nodes):
-            for child in node.get("children") or []:
-                if not isinstance(child, int) or not 0 <= child < len(self._nodes):
-                    raise MeshError(f"glTF: node {number}: expected children of {len(self._nodes)} nodes, got {child}")
-                if above.setdefault(child, number) != number or (node["children"].count(child) > 1):
-                    raise MeshError("glTF: expected each node below at most one other, got one below two")
-        order = self._reached([number for number in range(len(self._nodes)) if number not in above])
+        order, above = self._reached(self._uppermost()), self._above
         if len(order) < len(self._nodes):
             raise MeshError("glTF: expected nodes without circles, got one")
         world: dict[int, Floats] = {}

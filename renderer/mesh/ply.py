@@ -404,12 +404,10 @@ def _polygons(polygons: _Column, positions: Float64Array, reading: Reading) -> N
     lengths = np.diff(polygons.starts)
     corners, rows = polygons.values, np.arange(len(lengths))
     if (lengths < 3).any():
-        reading.note("left out: faces of fewer than three corners")
+        reading.no_polygon()
         corners, rows = corners[np.repeat(lengths >= 3, lengths)], rows[lengths >= 3]
     cut = triangulate(positions, corners, np.concatenate([[0], np.cumsum(lengths[rows])]))
-    if len(cut.wrong):
-        reading.note("polygons that cross themselves or are far from flat are cut as fans, by the row of the face:",
-                     rows[cut.wrong].tolist())  # fmt: skip
+    reading.cut(rows[cut.wrong].tolist(), "the row of the face")
     triangles: NDArray[np.int64] = corners[cut.places]
     return triangles
 

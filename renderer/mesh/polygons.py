@@ -128,23 +128,21 @@ def _cut_notched(positions: _Floats, polygons: _Ints) -> Iterator[tuple[int, _In
 
     The triangles are (n - 2, 3) numbers of the polygon's corners, fewer where it goes there and back.
     """
-    step = max(1, (1 << 22) // polygons.shape[1] ** 2)
-    for begin in range(0, len(polygons), step):
-        points = positions[polygons[begin : begin + step]]
-        points = points - points[:, :1]
-        points = np.ldexp(points, -np.frexp(np.abs(points).max(axis=(1, 2), keepdims=True))[1])
-        before, after = points[:, 1:-1], points[:, 2:]
-        cross = np.cross(before, after)
-        normals = cross.sum(axis=1, keepdims=True)
-        lengths = np.linalg.norm(normals, axis=2, keepdims=True)
-        normals = normals / np.where(lengths > 0.0, lengths, 1.0)
-        sizes = np.linalg.norm(before, axis=2) * np.linalg.norm(after, axis=2)
-        turned = (cross * normals).sum(axis=2) < _TURNED_OVER * sizes
-        notched = turned.any(axis=1) | (lengths[:, 0, 0] == 0.0)
-        planar = (np.ptp((points * normals).sum(axis=2), axis=1) <= _OUT_OF_PLANE) & (lengths[:, 0, 0] > 0.0)
-        flat = _projected(points, normals[:, 0])
-        for k in np.flatnonzero(notched):
-            yield begin + int(k), _cut_outline(flat[k]) if planar[k] else None
+    points = positions[polygons]
+    points = points - points[:, :1]
+    points = np.ldexp(points, -np.frexp(np.abs(points).max(axis=(1, 2), keepdims=True))[1])
+    before, after = points[:, 1:-1], points[:, 2:]
+    cross = np.cross(before, after)
+    normals = cross.sum(axis=1, keepdims=True)
+    lengths = np.linalg.norm(normals, axis=2, keepdims=True)
+    normals = normals / np.where(lengths > 0.0, lengths, 1.0)
+    sizes = np.linalg.norm(before, axis=2) * np.linalg.norm(after, axis=2)
+    turned = (cross * normals).sum(axis=2) < _TURNED_OVER * sizes
+    notched = turned.any(axis=1) | (lengths[:, 0, 0] == 0.0)
+    planar = (np.ptp((points * normals).sum(axis=2), axis=1) <= _OUT_OF_PLANE) & (lengths[:, 0, 0] > 0.0)
+    flat = _projected(points, normals[:, 0])
+    for k in np.flatnonzero(notched):
+        yield int(k), _cut_outline(flat[k]) if planar[k] else None
 
 
 def _cut_outline(outline: _Floats) -> _Ints | None:

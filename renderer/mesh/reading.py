@@ -48,8 +48,22 @@ class Reading:
         found = np.asarray(ends, np.int64)
         return (np.searchsorted(self.repairs[-1].kept_faces, found) if self.repairs else found).tolist()
 
+    def cut(self, wrong: Any, number: str) -> None:
+        """Note the polygons that keep a fan although it does not cover them once, each by its ``number``."""
+        if len(wrong):
+            self.note(f"polygons that cross themselves or are far from flat are cut as fans, by {number}:", wrong)
+
+    def no_polygon(self) -> None:
+        """Note that a face has too few corners."""
+        self.note("left out: faces of fewer than three corners")
+
     @property
-    def total(self) -> Repairs | None:
+    def said(self) -> str:
+        """All that was left out or read otherwise than it stands; nothing where all was read."""
+        return "; ".join([*([str(self._total)] if self._total else []), *self.notes])
+
+    @property
+    def _total(self) -> Repairs | None:
         """All meshes' repairs as if they were one mesh's, of which only the counts mean something; None for none."""
         if not any(self.repairs):
             return None

@@ -585,20 +585,19 @@ def _table(path: Path) -> dict[str, Any]:
     other = f"{path}: expected a scene file (.toml) or a mesh file ({', '.join(MESH_SUFFIXES)}), got {path.suffix!r}"
     named = path.suffix.lower() == ".toml"
     try:
-        table = tomllib.loads(read_whole(path).decode("utf-8-sig"))
-        if not named and "camera" not in table:
-            raise SceneError(other)
-        return table
+        content = read_whole(path)
     except FileNotFoundError as error:
         raise NoSuchSceneError(f"{path}: cannot be read: {error.strerror}") from None
     except OSError as error:
         raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
-    except SceneError:
-        raise
+    try:
+        table = tomllib.loads(content.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:  # not only TOML's: bad UTF-8, too many digits
-        if not named and path.suffix:
-            raise SceneError(other) from None
-        raise SceneError(f"{path}: expected TOML, got a syntax error: {error}") from None
+        told = f"{path}: expected TOML, got a syntax error: {error}" if named or not path.suffix else other
+        raise SceneError(told) from None
+    if not named and "camera" not in table:
+        raise SceneError(other)
+    return table
 
 
 def _mesh_entries(table: dict[str, Any]) -> list[dict[str, Any]]:

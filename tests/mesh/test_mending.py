@@ -35,16 +35,19 @@ def test_corners_at_one_place_are_joined(noise: float) -> None:
 
 @pytest.mark.judges("Mesh.welded")
 @settings(max_examples=100)
-@given(st.integers(1, 40), st.integers(0, 10**6), st.sampled_from([0.05, 0.2, 1.0]))
-def test_points_are_joined_as_chains_of_close_pairs(count: int, seed: int, reach: float) -> None:
-    """As a search over all pairs joins them."""
+@given(
+    st.integers(1, 40), st.integers(0, 10**6), st.sampled_from([1e-30, 0.05, 0.2, 1.0]), st.sampled_from([-700, 0, 900])
+)
+def test_points_are_joined_as_chains_of_close_pairs(count: int, seed: int, reach: float, power: int) -> None:
+    """As a search over all pairs joins them; a mesh of any size alike, though squares of lengths are no float64."""
     points = np.random.default_rng(seed).random((count, 3))
     number = np.arange(count)
     close = np.linalg.norm(points[:, None] - points[None], axis=2) <= reach
     for _ in range(count):
         number = np.array([number[row].min() for row in close])
-    mesh, left_out = Mesh(points, np.zeros((0, 3), int)).welded(reach)
-    assert mesh.vertices.tolist() == points[np.unique(number)].tolist() and left_out == count - len(mesh.vertices)
+    scaled = np.ldexp(points, power)
+    mesh, left_out = Mesh(scaled, np.zeros((0, 3), int)).welded(float(np.ldexp(reach, power)))
+    assert mesh.vertices.tolist() == scaled[np.unique(number)].tolist() and left_out == count - len(mesh.vertices)
 
 
 @pytest.mark.judges("Mesh.welded")
