@@ -24,7 +24,7 @@ def saved() -> bytes:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         with Viewer(browser, url, refine=True, viewport={"width": 1100, "height": 700}) as viewer:
             viewer.open()
-            viewer.page.wait_for_function("() => window.viewer.shown?.samples >= 16")
+            viewer.page.wait_for_function("() => window.viewer.traced.shown?.samples >= 16")
             viewer.page.evaluate("() => (document.querySelector('#share').open = true)")
             with viewer.page.expect_download() as download:
                 viewer.page.click("#share-file")

@@ -181,7 +181,7 @@ class Viewer:
 
     def restart(self) -> None:
         """Everything as it was when the page opened."""
-        if self.page.evaluate("() => viewer.objects.hidden.length && (viewer.hide([]), 1)"):
+        if self.page.evaluate("() => viewer.objects.hidden.length && (viewer.scenes.hide([]), 1)"):
             self.page.wait_for_function("() => !viewer.objects.hidden.length")
         self.page.evaluate(
             """() => {
@@ -204,8 +204,8 @@ class Viewer:
         self.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
         shown = """(mode) => {
             const { dataset } = document.querySelector("#stage");
-            const { viewer } = window;
-            return dataset.mode === mode && dataset.last === "1" && Number(dataset.seq) === viewer.seq && !viewer.dirty;
+            const { seq, dirty } = window.viewer.traced;
+            return dataset.mode === mode && dataset.last === "1" && Number(dataset.seq) === seq && !dirty;
         }"""
         self.page.wait_for_function(shown, arg=mode)
         return self.page.evaluate("() => ({ ...document.querySelector('#stage').dataset })")

@@ -71,13 +71,13 @@ def test_a_change_of_mode_waits_a_moment_for_its_picture_and_draws_once(viewer: 
     drawn = viewer.page.evaluate(
         """async (answered) => {
           const { model } = viewer.layer, { draw } = model;
-          const drawn = [], frame = () => new Promise(requestAnimationFrame), sent = viewer.seq;
+          const drawn = [], frame = () => new Promise(requestAnimationFrame), sent = viewer.traced.seq;
           const noon = performance.now();
           performance.now = () => noon; // time stands still, so that a slow machine changes nothing
           model.draw = (...a) => { drawn.push(viewer.stage.dataset.mode); draw.apply(model, a); };
           if (!answered) viewer.connection.send = () => {};
           viewer.setMode("phong");
-          while (viewer.seq === sent) await frame();
+          while (viewer.traced.seq === sent) await frame();
           for (let i = 0; i < 5 || (answered && viewer.stage.dataset.mode !== "phong"); i++) await frame();
           const inTime = drawn.length;
           delete performance.now;
@@ -132,7 +132,7 @@ def test_brute_force_can_be_cancelled(viewer: Viewer) -> None:
     viewer.page.click("#cancel")
     viewer.page.wait_for_selector("#progress[hidden]", state="attached")
     # One that was on its way when the button was pressed showed the bar again, for ever.
-    viewer.page.evaluate("() => window.viewer.told({ type: 'progress', seq: window.viewer.seq, done: 0.5 })")
+    viewer.page.evaluate("() => window.viewer.told({ type: 'progress', seq: window.viewer.traced.seq, done: 0.5 })")
     assert viewer.page.is_hidden("#progress")
     viewer.page.select_option("[name=size]", "0.5")
     viewer.choose("octree")
@@ -286,15 +286,13 @@ def test_what_an_address_asked_for_is_forgotten_when_it_fails_and_when_the_user_
         }"""
     )
     viewer.page.locator("#notices p", has_text="fov").wait_for()
-    viewer.page.evaluate("() => viewer.open('other.toml')")
+    viewer.page.evaluate("() => viewer.scenes.open('other.toml')")
     viewer.shows("other.toml")
     opened = "() => { delete viewer.connection.send; return window.opened; }"
     assert viewer.page.evaluate(opened) == ["broken.toml", "other.toml"]
-    asks = "viewer.goTo({ file: 'broken.toml', hidden: [], chosen: {} })"
-    asked = (
-        f"() => {{ {asks}; const {{ file }} = viewer.asked; viewer.open('blocks.toml'); return [file, viewer.asked]; }}"
-    )
-    assert viewer.page.evaluate(asked) == ["broken.toml", None]
+    asks = "({ scenes } = viewer) => { scenes.goTo({ file: 'broken.toml', hidden: [], chosen: {} }); return "
+    then = "[scenes.asked.file, (scenes.open('blocks.toml'), scenes.asked)]; }"
+    assert viewer.page.evaluate(asks + then) == ["broken.toml", None]
     viewer.shows("blocks.toml")
     viewer.settled("octree")
 
@@ -442,7 +440,7 @@ def test_a_message_that_is_too_large_is_not_sent_again(viewer: Viewer) -> None:
     # And the page says so as long as it is so, and waits for nothing.
     viewer.page.evaluate("() => { viewer.connection.limit = 100; viewer.moved(); }")
     viewer.page.locator("#notices p", has_text="too large").wait_for()
-    assert not viewer.page.evaluate("() => viewer.coming")
+    assert not viewer.page.evaluate("() => viewer.traced.coming")
     viewer.page.evaluate("() => { viewer.connection.limit = Infinity; viewer.moved(); }")
     viewer.settled("octree")
     assert "too large" not in viewer.page.inner_text("#notices")

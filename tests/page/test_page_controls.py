@@ -130,9 +130,9 @@ def test_more_boxes_than_can_be_drawn_are_not_drawn_and_that_is_said(viewer: Vie
         viewer.choose("gl")
         deepest = viewer.page.get_attribute("[name=level]", "max")
         viewer.page.locator("[name=level]").fill(deepest)
-        viewer.page.wait_for_function("() => viewer.boxes.count > 0")
+        viewer.page.wait_for_function("() => viewer.scenes.boxes.count > 0")
         count, edges, panes, everything = viewer.page.evaluate(
-            "() => [viewer.boxes.count, viewer.boxes.edges.count, viewer.boxes.panes.count, viewer.boxes.all]"
+            "({ count, edges, panes, all } = viewer.scenes.boxes) => [count, edges.count, panes.count, all]"
         )
         assert (count, edges, panes) == (5, 60, 5) and everything > 5
         shown = viewer.page.evaluate("() => viewer.panel.fields.level_shown.value")

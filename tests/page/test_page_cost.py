@@ -20,9 +20,7 @@ def test_a_legend_shows_the_scale_of_colours(page: Viewer, aov: str) -> None:
     assert page.page.is_hidden("#legend")
     page.page.select_option("[name=aov]", aov)
     page.settled("octree")
-    low, high = page.page.evaluate(
-        "() => [...viewer.sent.values()].length, [viewer.shown.view.legend.low, viewer.shown.view.legend.high]"
-    )
+    low, high = page.page.evaluate("() => [viewer.traced.shown.view.legend.low, viewer.traced.shown.view.legend.high]")
     ends = page.page.locator("#legend .ends span").all_inner_texts()
     assert float(ends[0].replace(",", "")) == pytest.approx(low, rel=1e-3)
     assert float(ends[-1].split()[0].replace(",", "")) == pytest.approx(high, rel=1e-3)

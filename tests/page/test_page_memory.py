@@ -40,5 +40,5 @@ def test_drags_and_clicks_leave_nothing_behind(browser: Any, url: str) -> None:
 
         drags()
         before, after = drags(), drags()
-        width, height = page.page.evaluate("() => [viewer.shown.w, viewer.shown.h]")
+        width, height = page.page.evaluate("() => [viewer.traced.shown.w, viewer.traced.shown.h]")
     assert after - before < 4 * width * height

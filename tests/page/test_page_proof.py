@@ -155,7 +155,7 @@ def test_neither_verdict_nor_picture_of_a_proof_stands_for_an_edited_scene(page:
         # Nothing of the next one comes before it is cancelled.
         page.page.evaluate("() => { viewer.connection.send = () => {}; }")
         page.page.evaluate(EDIT, 0.5)
-        page.page.wait_for_function("() => !viewer.dirty")
+        page.page.wait_for_function("() => !viewer.traced.dirty")
         assert page.page.evaluate(seen) == ["", False, False]  # the picture stands until the next one comes
         page.page.evaluate("() => viewer.cancel()")
         page.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")

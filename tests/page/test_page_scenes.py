@@ -142,7 +142,7 @@ def test_pictures_are_traced_before_the_model_is_there(browser: Any, url: str) -
         page.page.wait_for_timeout(600)
         page.settled("octree")
         assert not np.array_equal(page.pixels("picture"), before)
-        assert page.page.evaluate("() => !viewer.layer.loaded && viewer.finished")
+        assert page.page.evaluate("() => !viewer.layer.loaded && viewer.traced.finished")
 
 
 def test_a_model_of_very_many_faces_is_fetched_when_it_is_to_be_seen(browser: Any, url: str) -> None:
@@ -224,7 +224,7 @@ def test_the_page_says_what_it_waits_for_and_then_no_more(browser: Any, url: str
         assert page.page.is_hidden("#busy")
         # Both at once: a quick server has answered before a second question.
         said = page.page.evaluate(
-            "() => { viewer.open('none.toml'); return document.querySelector('#busy').textContent; }"
+            "() => { viewer.scenes.open('none.toml'); return document.querySelector('#busy').textContent; }"
         )
         assert said == "Opening none.toml …"
         page.page.locator("#notices p", has_text="scene.file").wait_for()
@@ -237,5 +237,5 @@ def test_no_wait_is_said_for_what_no_longer_comes(viewer: Viewer) -> None:
         viewer.page.evaluate("() => { viewer.busy.begin('tracing', 'x'); viewer.progress.show(0.5); }")
         viewer.page.evaluate(f"() => {{ {end}; }}")
         assert viewer.page.is_hidden("#busy")
-    viewer.page.evaluate("() => { viewer.loadMesh(); }")
+    viewer.page.evaluate("() => { viewer.scenes.loadMesh(); }")
     viewer.page.wait_for_function("() => viewer.layer.loaded")

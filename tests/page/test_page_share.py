@@ -93,7 +93,7 @@ def made(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Made:
     with served(folder / "blocks.toml") as url:
         viewer = Viewer(browser, url).open()
         viewer.page.set_checked("[name=boxes]", True)
-        viewer.page.wait_for_function("() => window.viewer.boxes.count > 0 && window.viewer.layer.loaded")
+        viewer.page.wait_for_function("() => window.viewer.scenes.boxes.count > 0 && window.viewer.layer.loaded")
         viewer.page.mouse.click(*viewer.centre())
         viewer.page.wait_for_selector("#card:not([hidden])")
         card = viewer.page.inner_text("#card dl")
@@ -228,7 +228,7 @@ def test_of_the_model_alone_its_drawing_is_the_picture(viewer: Viewer, browser: 
     viewer.choose(mode)
     drawn = viewer.pixels("gl")
     viewer.page.set_checked("[name=boxes]", True)
-    viewer.page.wait_for_function("() => window.viewer.boxes.count > 0")
+    viewer.page.wait_for_function("() => window.viewer.scenes.boxes.count > 0")
     path = saved(viewer, tmp_path / "model.html")
     with Saved(browser, path).open() as page:
         assert np.array_equal(page.picture, drawn)  # without the boxes, which are a layer of their own

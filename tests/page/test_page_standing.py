@@ -23,14 +23,14 @@ GO_ON = """() => {
 }"""
 # Notes after each drawing whether the traced picture is seen, and how wide it is; null where WebGL's model is.
 WATCH = """() => {
-    const { viewer } = window, { draw } = viewer;
+    const { viewer } = window, { draw } = viewer.frames;
     window.drawn = [];
-    viewer.draw = () => {
-        draw.call(viewer);
+    viewer.frames.draw = () => {
+        draw.call(viewer.frames);
         window.drawn.push(viewer.picture.canvas.classList.contains("away") ? null : viewer.picture.canvas.width);
     };
 }"""
-WATCHED = "() => { delete window.viewer.draw; return window.drawn; }"
+WATCHED = "() => { delete window.viewer.frames.draw; return window.drawn; }"
 # Longer than a picture of another camera may stand.
 STALE = 600
 
@@ -48,10 +48,10 @@ def test_the_first_traced_picture_stands_until_a_finer_one_comes(odd: Viewer) ->
     assert 128 * height != round(128 * height / width) * width
     odd.page.evaluate(HOLD, "ack")
     odd.page.evaluate("() => { viewer.camera.orbit(0.4, 0); viewer.moved(); }")
-    odd.page.wait_for_function("() => window.held.some(({ seq, step }) => seq === viewer.seq && step === 0)")
+    odd.page.wait_for_function("() => window.held.some(({ seq, step }) => seq === viewer.traced.seq && step === 0)")
     odd.page.evaluate(WATCH)
     odd.page.wait_for_timeout(STALE)
-    odd.page.evaluate("() => viewer.draw()")
+    odd.page.evaluate("() => viewer.frames.draw()")
     odd.page.evaluate(GO_ON)
     odd.settled("octree")
     drawn = odd.page.evaluate(WATCHED)
@@ -132,7 +132,7 @@ def test_a_cancelled_view_leaves_only_a_picture_that_is_true_of_it(viewer: Viewe
     assert viewer.page.is_visible("#legend")
     viewer.page.evaluate("() => { viewer.connection.send = () => {}; viewer.setMode('brute'); }")
     try:
-        viewer.page.wait_for_function("() => !viewer.dirty")
+        viewer.page.wait_for_function("() => !viewer.traced.dirty")
         viewer.page.evaluate("() => viewer.cancel()")
         viewer.page.wait_for_function("() => viewer.picture.canvas.classList.contains('away')", timeout=5000)
         assert viewer.page.is_hidden("#legend")
@@ -144,7 +144,7 @@ def test_a_picture_that_is_not_finished_is_saved_when_it_is(odd: Viewer, tmp_pat
     """The coarse one that stood there was written, without a word."""
     odd.page.evaluate(HOLD, "ack")
     odd.page.evaluate("() => { viewer.camera.orbit(0.4, 0); viewer.moved(); }")
-    odd.page.wait_for_function("() => window.held.some(({ seq, step }) => seq === viewer.seq && step === 0)")
+    odd.page.wait_for_function("() => window.held.some(({ seq, step }) => seq === viewer.traced.seq && step === 0)")
     odd.page.click("#save-picture")
     assert "when it is finished" in odd.page.inner_text("#notices")
     with odd.page.expect_download() as saved:
@@ -163,17 +163,17 @@ RECORD = """() => {
     const { viewer } = window;
     const cameras = [JSON.stringify(viewer.view().m)];
     const index = (m) => cameras.lastIndexOf(JSON.stringify(m));
-    const { moved, draw } = viewer;
+    const { moved, frames: { draw } } = viewer;
     window.frames_seen = [];
     viewer.moved = function () {
         const now = JSON.stringify(this.view().m);
         if (cameras.at(-1) !== now) cameras.push(now);
         moved.call(this);
     };
-    viewer.draw = function () {
+    viewer.frames.draw = function () {
         draw.call(this);
-        const traced = this.current || this.recent;
-        const { view, seq, step, w } = traced ? this.shown : { view: this.view(), seq: 0, step: 0, w: 0 };
+        const { current, recent, shown } = viewer.traced, traced = current || recent;
+        const { view, seq, step, w } = traced ? shown : { view: viewer.view(), seq: 0, step: 0, w: 0 };
         window.frames_seen.push({ traced, camera: index(view.m), now: cameras.length - 1, seq, step, w });
     };
 }"""

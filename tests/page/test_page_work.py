@@ -66,12 +66,12 @@ def test_a_colour_is_picked(viewer: Viewer, scenes: Path) -> None:
 
 
 def test_what_is_no_number_changes_nothing(viewer: Viewer) -> None:
-    before = viewer.page.evaluate("() => viewer.seq")
+    before = viewer.page.evaluate("() => viewer.traced.seq")
     unfold(viewer, RED)
     for wrong in ("", "-1"):
         viewer.page.locator(f"{RED} [aria-label='diffuse, green']").fill(wrong)
         assert viewer.page.evaluate("() => viewer.panel.settings.edits ?? null") is None
-    assert viewer.page.evaluate("() => viewer.seq") == before
+    assert viewer.page.evaluate("() => viewer.traced.seq") == before
 
 
 def test_webgl_and_the_card_show_the_materials_as_they_are(viewer: Viewer) -> None:
@@ -211,7 +211,7 @@ def test_the_last_object_cannot_be_hidden(viewer: Viewer) -> None:
         viewer.page.wait_for_function("(id) => viewer.scene.id !== id", arg=before)
         settled(viewer)
     assert viewer.page.is_disabled("#objects [data-name=floor]")
-    viewer.page.evaluate("() => viewer.hide([])")
+    viewer.page.evaluate("() => viewer.scenes.hide([])")
     viewer.page.wait_for_function("() => viewer.objects.hidden.length === 0")
 
 
@@ -327,7 +327,7 @@ def test_an_address_hides_objects_once(viewer: Viewer, hidden: str) -> None:
         }""",
         hidden,
     )
-    again = "(names) => window.hides > 1 || (String(viewer.objects.hidden) === names && viewer.finished)"
+    again = "(names) => window.hides > 1 || (String(viewer.objects.hidden) === names && viewer.traced.finished)"
     viewer.page.wait_for_function(again, arg=",".join(names))
     assert viewer.page.evaluate("() => { delete viewer.connection.send; return window.hides; }") == 1
 

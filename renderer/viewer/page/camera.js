@@ -7,6 +7,7 @@ const STEEPEST = (89.5 * Math.PI) / 180;
 const USUAL = Math.PI / 4;
 // Half the height of the film, in millimetres, for which focal lengths are given: 36 x 24, as of 35 mm cameras.
 const HALF_FILM = 12;
+const QUARTER = Math.PI / 2;
 // Fields of view that the server allows.
 const [NARROWEST, WIDEST] = [0.001, 3.1];
 
@@ -36,6 +37,13 @@ export class Camera {
     this.yaw = Math.atan2(dot(back, this.axes[0]), dot(back, this.axes[2]));
     this.pitch = Math.asin(Math.max(-1, Math.min(1, dot(back, vertical))));
     this.pivot = [...target];
+  }
+
+  // Where the sides of the scene lie.
+  get sides() {
+    const [right, top, front] = this.axes;
+    const [left, bottom, back] = this.axes.map((axis) => scale(axis, -1));
+    return { front, back, left, right, top, bottom };
   }
 
   // What the user changes, to be kept and set again.
@@ -160,6 +168,14 @@ export class Camera {
     if (this.height !== null) this.height = wanted;
     else this.distance = wanted / (2 * Math.tan(this.fovy / 2));
     this.pan(-x, 0);
+  }
+
+  // See the pivot from where a direction points. From above and below, the picture's sides lie along two axes.
+  lookFrom(direction) {
+    const [aside, up, depth] = this.axes.map((axis) => dot(unit(direction), axis));
+    this.pitch = Math.asin(Math.max(-1, Math.min(1, up)));
+    const level = Math.hypot(aside, depth) > 1e-9;
+    this.yaw = level ? Math.atan2(aside, depth) : Math.round(this.yaw / QUARTER) * QUARTER;
   }
 
   // Walk: right, up and forward in scene units.

@@ -17,7 +17,7 @@ const ZOOM_RATE = 2;
 const TAP = 0.04;
 
 // What stands on the stage and is no part of the picture.
-const OWN = "button, .proof, .slider";
+const OWN = "button, .axes g, .proof, .slider";
 
 const HELD = {
   ArrowLeft: [0, -1, 0], ArrowRight: [0, 1, 0], ArrowUp: [0, 0, 1], ArrowDown: [0, 0, -1],

@@ -25,10 +25,7 @@ export function bindKeys(viewer) {
     ",": () => level(-1),
     ".": () => level(1),
     Escape: () => (viewer.rays.shown ? viewer.rays.close() : viewer.cancel()),
-    Enter: () => {
-      const { left, top, width, height } = document.querySelector("#frame").getBoundingClientRect();
-      viewer.pickAt(left + width / 2, top + height / 2);
-    },
+    Enter: () => viewer.picking.middle(),
   };
   MODES.forEach((mode, i) => (commands[i + 1] = () => viewer.setMode(mode)));
   document.addEventListener("keydown", (event) => {

@@ -61,14 +61,14 @@ export class Share {
   seen() {
     const { viewer } = this;
     const name = document.querySelector(`[name=mode][value=${viewer.mode}]`).parentElement.textContent.slice(1);
-    if (viewer.current || (viewer.shown && !viewer.layer?.loaded))
-      return { canvas: viewer.picture.canvas, view: viewer.shown.view, mode: name };
+    const { current, shown } = viewer.traced;
+    if (current || (shown && !viewer.layer?.loaded)) return { canvas: viewer.picture.canvas, view: shown.view, mode: name };
     if (!viewer.layer?.loaded) throw new Error("there is no picture yet");
     const { canvas } = viewer.layer;
     const copy = element("canvas", { width: canvas.width, height: canvas.height });
-    viewer.layer.draw(viewer.view(), drawing(viewer.shading, NO_BOXES, NO_RAYS));
+    viewer.layer.draw(viewer.view(), drawing(viewer.frames.shading, NO_BOXES, NO_RAYS));
     copy.getContext("2d").drawImage(canvas, 0, 0);
-    viewer.draw();
+    viewer.frames.draw();
     return { canvas: copy, view: viewer.view(), mode: viewer.mode === "phong" ? name : "Preview" };
   }
 }

@@ -62,7 +62,7 @@ export class Sharing {
     this.file.disabled = true;
     viewer.busy.begin("sharing", "Making the file …");
     try {
-      while (viewer.coming) await new Promise((resolve) => setTimeout(resolve, LOOK));
+      while (viewer.traced.coming) await new Promise((resolve) => setTimeout(resolve, LOOK));
       const { blob, name, note } = await this.share.file();
       this.saved(blob, name, note);
     } catch (error) {
