@@ -12,7 +12,7 @@ from renderer.diagnostics.tree_boxes import boxes_at, levels
 from renderer.errors import expect
 from renderer.mesh.mesh import face_normals
 from renderer.picture.prepare import PreparedScene
-from renderer.scene.hide import FLOOR, object_names
+from renderer.scene.hide import FLOOR, is_side, object_names
 from renderer.scene.light import DirectionalLight, Light
 from renderer.scene.material import Material, material_row
 from renderer.scene.needs import examine
@@ -45,6 +45,10 @@ def description(shown: ShownScene) -> dict[str, Any]:
         "render": settings.model_dump(include={"resolution", "samples", "max_depth", "shadows"}),
         "materials": [_material(name, material) for name, material in scene.materials.items()],
         "objects": _objects(shown),
+        "section": {
+            "hidden": [name for name in shown.hidden if is_side(name)],
+            "bounds": [corner.tolist() for corner in shown.whole.prepared.mesh.bounds],
+        },
         "lights": [_light(light) for light in scene.lights],
         "ambient": scene.ambient,
         "background": scene.background if scene.sky is None else scene.sky.horizon,

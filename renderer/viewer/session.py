@@ -12,7 +12,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
 
-from renderer.scene.hide import object_names
+from renderer.scene.hide import is_side, object_names
 from renderer.viewer.commands import command_of, saved, scene_text
 from renderer.viewer.compare import Comparison
 from renderer.viewer.export import Exporter
@@ -337,9 +337,11 @@ class Session:
     async def _without(self, shown: ShownScene, hidden: Collection[str]) -> ShownScene:
         """``shown`` without those of the objects that it has."""
         known = object_names(shown.whole.scene)
-        hidden = [name for name in hidden if name in known]
+        objects = [name for name in hidden if name in known]
         # What is hidden stays so where the file was edited, unless nothing else is left in it.
-        return await self.host.hide(shown, hidden) if len(hidden) < len(known) else shown
+        if len(objects) == len(known):
+            return shown
+        return await self.host.hide(shown, [*objects, *filter(is_side, hidden)])
 
     async def _tell(self, **message: Any) -> None:
         await self.connection.text(_as_text(message))

@@ -13,7 +13,7 @@ from renderer.picture.pack import light_rows, repacked
 from renderer.picture.prepare import PreparedScene, build_octree, prepare_scene, tree_for
 from renderer.precompile import touch_viewing
 from renderer.scene.camera import unit
-from renderer.scene.hide import object_names, without
+from renderer.scene.hide import is_side, object_names, without
 from renderer.scene.needs import Features, needs_of
 from renderer.scene.scene import RenderSettings, Scene, load_scene, mesh_files
 from renderer.shade.records import DIRECTIONAL, REFLECTANCE, TRANSMITTANCE
@@ -44,7 +44,7 @@ class ShownScene:
     marks     the files that it was loaded from, as they were then
     up        the axis that was given for a mesh file, else None
     id        what tells it from every other scene, also from the same file loaded anew or by another server
-    hidden    the objects that are left out, by name
+    hidden    the objects that are left out, by name, and sides of planes
     all       the scene with all objects where some are hidden, else None
     """
 
@@ -157,11 +157,13 @@ def _lit(arrays: SceneArrays, scene: Scene, needs: Features) -> SceneArrays:
 
 
 def hiding(shown: ShownScene, hidden: Collection[str]) -> ShownScene:
-    """``shown`` without the objects ``hidden``, and with all others. Raises ``ValueError`` for unknown names, and if
-    nothing is left.
+    """``shown`` without the objects and the sides of planes ``hidden``, and with all others.
+
+    Raises ``ValueError`` for unknown names, and if nothing is left.
     """
     whole = shown.whole
-    names = tuple(name for name in object_names(whole.scene) if name in hidden)
+    known = object_names(whole.scene)
+    names = (*(name for name in known if name in hidden), *(name for name in dict.fromkeys(hidden) if is_side(name)))
     scene = without(whole.scene, hidden)
     if not names:
         return whole

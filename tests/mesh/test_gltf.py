@@ -65,11 +65,11 @@ def test_each_instance_is_placed(key: str) -> None:
         "ROTATION": glb.add([[0.0, 0, 0, 1], [0, 0, 0, 1], TURN["rotation"]], "f", 5126, "VEC4", 0),
         "SCALE": glb.add([[1.0, 1, 1], [3, 1, 1], [1, 1, 1]], "f", 5126, "VEC3", 0),
     }
-    node = {"mesh": 0, "name": "tree", "translation": [0, 0, 5],
+    node = {"mesh": 0, "name": "tree", "translation": [0, 0, 5], "scale": [2, 1, 1],
             "extensions": {"EXT_mesh_gpu_instancing": {"attributes": attributes}}}  # fmt: skip
     mesh = parse_mesh(glb.file(**{**SCENE, **document, "nodes": [node], key: ["EXT_mesh_gpu_instancing"]}), ".glb")
     assert mesh.triangles.round(6).tolist() == [
-        [[0, 0, 5], [1, 0, 5], [0, 1, 5]], [[2, 0, 5], [5, 0, 5], [2, 1, 5]], [[4, 0, 5], [4, 1, 5], [3, 0, 5]],
+        [[0, 0, 5], [2, 0, 5], [0, 1, 5]], [[4, 0, 5], [10, 0, 5], [4, 1, 5]], [[8, 0, 5], [8, 1, 5], [6, 0, 5]],
     ]  # fmt: skip
     assert [(part.name, part.faces) for part in mesh.parts] == [("tree", slice(0, 3))]
 

@@ -204,6 +204,29 @@ def test_objects_are_hidden_and_seen_again_with_all_else_as_it_was(viewer: Viewe
         assert viewer.page.evaluate("() => viewer.objects.hidden") == hidden
 
 
+def test_the_scene_is_cut_open_and_turned(viewer: Viewer, scenes: Path) -> None:
+    """And whole again by Undo; the camera stays, and so does what else is hidden."""
+    scene, camera = load_scene(scenes / "blocks.toml"), viewer.camera
+    viewer.page.evaluate("() => viewer.past.write()")
+    lower, upper = (row[0] for row in viewer.page.evaluate("() => viewer.scene.bounds"))
+    middle = viewer.page.evaluate("([a, b]) => Number(((a + b) / 2).toFixed(3))", [lower, upper])
+    for act, wanted in (
+        (lambda: viewer.page.select_option("#section select", "x"), [f"x > {middle:g}"]),
+        (lambda: viewer.page.click("#section button"), [f"x < {middle:g}"]),
+        (lambda: viewer.page.click("#objects [data-name=floor]"), ["floor", f"x < {middle:g}"]),
+    ):
+        act()
+        viewer.page.wait_for_function("(names) => String(viewer.scenes.hidden) === names", arg=",".join(wanted))
+        settled(viewer)
+        shows(viewer, without(scene, wanted))
+        assert viewer.camera == camera
+    viewer.page.evaluate("() => viewer.past.write()")
+    viewer.page.click("#undo")
+    viewer.page.wait_for_function("() => !viewer.scenes.hidden.length")
+    settled(viewer)
+    shows(viewer, scene)
+
+
 def test_the_last_object_cannot_be_hidden(viewer: Viewer) -> None:
     for name in ("objects.0", "objects.1"):
         before = viewer.page.evaluate("() => viewer.scene.id")

@@ -1,5 +1,6 @@
 """Each key that ``--change`` can set, changed alone, gives the picture of a scene file that has it."""
 
+import re
 from pathlib import Path
 from typing import get_args
 
@@ -8,10 +9,10 @@ import tomlkit
 from cases import cases
 from varied import BASE, VARIATIONS, Table, Variation, picture, scene_of
 
-from renderer import RenderSettings
+from renderer import Hits, Mesh, Octree, RenderSettings, Scene
 from renderer.cli.main import main
 from renderer.scene.camera import Camera
-from renderer.scene.change import _Changes
+from renderer.scene.change import _Changes, changed
 from renderer.scene.hide import object_names
 from renderer.scene.light import Light
 from renderer.scene.material import Material
@@ -25,6 +26,12 @@ def written_by(folder: Path, table: Table, text: str) -> np.ndarray:
     words = [str(folder / "scene.toml"), "--change", text, "-o", str(folder / "a.npy"), "--quiet"]
     assert main(["render", *words]) == 0
     return np.load(folder / "a.npy")
+
+
+def shot(scene: Scene) -> Hits:
+    """What the rays of a picture hit."""
+    octree = Octree(Mesh.concatenate(part.mesh for part in scene.instances))
+    return octree.closest_hit(*(rays.reshape(-1, 3) for rays in scene.camera.primary_rays(48)))
 
 
 def text_of(other: Variation) -> str:
@@ -46,6 +53,21 @@ def test_a_change_gives_the_picture_of_a_file_that_has_it(folder: Path, other: V
     found = written_by(folder, other.table, text_of(other))
     assert found.tobytes() == picture(scene_of(folder, other.varied())).radiance.tobytes()
     assert found.tobytes() != picture(scene_of(folder, other.table)).radiance.tobytes()
+
+
+@cases("side", ["x > 0.3", "z < -0.2", "y>.25"])
+def test_what_is_cut_off_is_not_seen_and_all_else_is(folder: Path, side: str) -> None:
+    """Depths of the picture: as before where the surface that was seen stays, and else of one that lies behind it."""
+    axis, sign, at = re.fullmatch("(.) ?(.) ?(.*)", side).groups()  # type: ignore[union-attr]
+    scene = scene_of(folder, BASE)
+    whole, left = (shot(one) for one in (scene, changed(scene, f'hide = ["{side}"]')))
+    stays = (whole.points[:, "xyz".index(axis)] - float(at)) * (1 if sign == ">" else -1) < -1e-9
+    assert 0.05 < stays[whole.hit].mean() < 0.95
+    np.testing.assert_allclose(left.t[whole.hit & stays], whole.t[whole.hit & stays], rtol=1e-12)
+    gone = whole.hit & ~stays
+    assert (left.t[gone] > whole.t[gone] - 1e-9).all()
+    beyond = left.points[left.hit, "xyz".index(axis)] - float(at)
+    assert (beyond * (1 if sign == ">" else -1) <= 1e-9).all()
 
 
 @cases("name", ["objects.0", "objects.1", "objects.2", "floor"])

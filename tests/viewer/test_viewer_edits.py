@@ -134,6 +134,8 @@ def test_objects_hidden_in_one_page_are_seen_in_another(client: Client, url: str
     ("hidden", "said"),
     [
         (["objects.9"], "hide: expected objects among"),
+        (["x > 1e"], "hide: expected objects among"),
+        (["x > -100"], "expected at least one face"),
         (["objects.0", "objects.1", "floor"], "at least one face"),
         (["x" * 41], "hidden.0"),
         ("floor", "hidden"),

@@ -22,6 +22,7 @@ import { Readings } from "./readings.js";
 import { copyText, saveText } from "./save.js";
 import { Saving } from "./saving.js";
 import { Scenes } from "./scenes.js";
+import { Section } from "./section.js";
 import { Sharing } from "./sharing.js";
 import { SLOW, TRACED, Traced } from "./traced.js";
 
@@ -48,7 +49,8 @@ class Viewer {
     this.busy = new Busy(find("#busy"));
     this.readings = new Readings(find("#readings"), find("#hud"));
     this.panel = new Panel((name) => this.changed(name));
-    this.objects = new Objects(find("#objects"), (hidden) => this.scenes.hide(hidden));
+    this.objects = new Objects(find("#objects"), (names) => this.scenes.hide([...names, ...this.section.hidden]));
+    this.section = new Section(find("#section"), () => this.scenes.hide([...this.objects.hidden, ...this.section.chosen]));
     this.changes = new Changes(find("#changes"));
     this.hint = new Hint(find("#hint"));
     this.sharing = new Sharing(this, find("#share"));

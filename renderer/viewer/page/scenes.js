@@ -6,6 +6,7 @@ import { heading } from "./element.js";
 import { continues, kept, remember, remembered, stays } from "./memory.js";
 import { fetchBoxes } from "./nodes.js";
 import { NO_BOXES } from "./overlay.js";
+import { isSide } from "./section.js";
 import { TRACED } from "./traced.js";
 
 // A mesh of more faces, some 70 MB, is fetched only once WebGL is to draw it.
@@ -65,6 +66,7 @@ export class Scenes {
     panel.load(scene);
     if (stays(before, scene) || continues(before, scene)) panel.chosen = before.chosen;
     viewer.objects.load(scene);
+    viewer.section.load(scene);
     viewer.dress();
     this.forget();
     viewer.readings.ofScene(scene);
@@ -95,8 +97,13 @@ export class Scenes {
 
   // What there is to come back to; null before there is a scene.
   get kept() {
-    const { scene, camera, panel, mode, objects } = this.viewer;
-    return scene && { ...kept(scene, camera), chosen: panel.chosen, mode, hidden: objects.hidden };
+    const { scene, camera, panel, mode } = this.viewer;
+    return scene && { ...kept(scene, camera), chosen: panel.chosen, mode, hidden: this.hidden };
+  }
+
+  // The names of objects that are hidden, and the sides of planes.
+  get hidden() {
+    return [...this.viewer.objects.hidden, ...this.viewer.section.hidden];
   }
 
   // What a connection that opens says of this page. The server may be another one by now, which shows its own scene.
@@ -107,8 +114,8 @@ export class Scenes {
 
   // The address of the view.
   get address() {
-    const { scene, mode, camera, panel, objects } = this.viewer;
-    return written({ file: scene.name, mode, state: camera.state, chosen: panel.chosen, hidden: objects.hidden });
+    const { scene, mode, camera, panel } = this.viewer;
+    return written({ file: scene.name, mode, state: camera.state, chosen: panel.chosen, hidden: this.hidden });
   }
 
   // Show the view of an address: of a scene that is not shown, once it is.
@@ -122,7 +129,7 @@ export class Scenes {
       this.asked = asked;
       return;
     }
-    if (hidden !== null && viewer.objects.differ(hidden)) {
+    if (hidden !== null && this.hides(hidden)) {
       this.hide(hidden);
       this.asked = { ...asked, hidden: null }; // asked for once, whatever the answer is
       return;
@@ -134,6 +141,12 @@ export class Scenes {
     viewer.changed("edits");
     viewer.layout();
     viewer.setMode(viewer.offers(mode) ? mode : viewer.mode);
+  }
+
+  // Whether other objects or another side of a plane are hidden than `names`.
+  hides(names) {
+    const { objects, section } = this.viewer;
+    return objects.differ(names.filter((name) => !isSide(name))) || section.differs(names.filter(isSide));
   }
 
   open(file) {
