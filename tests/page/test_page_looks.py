@@ -112,7 +112,7 @@ HANDLE = """() => {
 def test_what_stands_on_the_picture_does_not_overlap(browser: Any, url: str, size: tuple[int, int]) -> None:
     with opened(browser, url, size=size, folded=True) as page:
         page.page.evaluate("() => viewer.notices.say('A notice that says a word or two.')")
-        names = ["#axes", "#bar", "#hud", "#hint", "#legend", "#proof", "#notices p", "#progress"]
+        names = ["#axes", "#scale", "#bar", "#hud", "#hint", "#legend", "#proof", "#notices p", "#progress"]
         assert overlapping(page, names) == []
         page.page.evaluate("() => (viewer.panel.fields.aov.value = 'depth', viewer.changed('aov'))")
         page.page.wait_for_selector("#legend:not([hidden])")

@@ -1,5 +1,7 @@
 // The page: one camera, five modes, and the parts that show and change what is seen.
+import { read } from "./address.js";
 import { Axes } from "./axes.js";
+import { Bookmarks } from "./bookmarks.js";
 import { Busy } from "./busy.js";
 import { Changes } from "./changes.js";
 import { Connection } from "./connection.js";
@@ -21,6 +23,7 @@ import { Proof } from "./proof.js";
 import { Readings } from "./readings.js";
 import { copyText, saveText } from "./save.js";
 import { Saving } from "./saving.js";
+import { ScaleBar } from "./scalebar.js";
 import { Scenes } from "./scenes.js";
 import { Section } from "./section.js";
 import { Sharing } from "./sharing.js";
@@ -43,6 +46,7 @@ class Viewer {
     });
     this.picture = new Picture(find("#picture"), this.proof);
     this.axes = new Axes(find("#axes"), (direction) => this.look(direction));
+    this.scale = new ScaleBar(find("#scale"));
     this.legend = new Legend(find("#legend"));
     this.notices = new Notices(find("#notices"));
     this.progress = new Progress(find("#progress"));
@@ -54,6 +58,9 @@ class Viewer {
     this.changes = new Changes(find("#changes"));
     this.hint = new Hint(find("#hint"));
     this.sharing = new Sharing(this, find("#share"));
+    this.bookmarks = new Bookmarks(find("#views"), {
+      seen: () => this.scenes.address, go: (address) => this.scenes.goTo(read(address)), say: (text) => this.notices.say(text),
+    });
     this.past = new Past(() => this.scenes.address, find("#undo"), find("#redo"));
     try {
       this.layer = new GlLayer(find("#gl"), () => this.lostGl());
@@ -137,6 +144,7 @@ class Viewer {
     onClick("#reset-view", () => this.reset());
     onClick("#fit", () => this.fit());
     find("#sides").addEventListener("click", ({ target: { dataset: { side } } }) => side && this.look(this.camera.sides[side]));
+    onClick("#keep-view", () => this.bookmarks.add());
     onClick("#cancel", () => this.cancel());
     onClick("#reload", () => scenes.open(this.scene.name));
     onClick("#reset-light", () => panel.edits.turnSun(panel.edits.sunlight));
@@ -213,6 +221,7 @@ class Viewer {
     if (this.proof.told && !this.traced.valid) this.proof.forget();
     this.panel.showCamera(this.camera);
     this.axes.show(this.camera);
+    this.scale.show(this.camera, this.frameHeight);
     this.past.keep();
     this.frames.request();
   }
@@ -222,6 +231,7 @@ class Viewer {
     const room = [Math.max(this.stage.clientWidth, 1), Math.max(this.stage.clientHeight, 1)];
     const { css, size } = film(room, this.panel.fields.size.value, this.scene.render.resolution, devicePixelRatio);
     this.size = size;
+    this.frameHeight = css[1];
     const { style } = find("#frame");
     [style.width, style.height] = css.map((side) => `${side}px`);
     this.layer?.resize(...css);

@@ -67,6 +67,7 @@ export class Scenes {
     if (stays(before, scene) || continues(before, scene)) panel.chosen = before.chosen;
     viewer.objects.load(scene);
     viewer.section.load(scene);
+    viewer.bookmarks.load(scene);
     viewer.dress();
     this.forget();
     viewer.readings.ofScene(scene);

@@ -1,0 +1,56 @@
+// Views that the user keeps, by their addresses, for each scene in this browser.
+import { element } from "./element.js";
+
+const KEY = "octree-render-views";
+const MOST = 50;
+
+// Some frames and private windows keep nothing.
+function kept() {
+  try {
+    return JSON.parse(localStorage.getItem(KEY)) ?? {};
+  } catch {
+    return {};
+  }
+}
+
+export class Bookmarks {
+  // `seen()` is the address of what is seen, and `go(address)` shows another one.
+  constructor(list, { seen, go, say }) {
+    Object.assign(this, { list, seen, go, say, scene: "" });
+  }
+
+  load({ name }) {
+    this.scene = name;
+    this.show();
+  }
+
+  get views() {
+    return kept()[this.scene] ?? [];
+  }
+
+  set views(views) {
+    try {
+      localStorage.setItem(KEY, JSON.stringify({ ...kept(), [this.scene]: views }));
+    } catch {
+      this.say("This browser keeps no views for this page; the address in its bar holds this one.");
+    }
+    this.show();
+  }
+
+  add() {
+    const { views } = this;
+    if (views.length >= MOST) return this.say(`${MOST} views are kept; remove one first.`);
+    const taken = views.map(({ name }) => Number(name.slice(5)));
+    this.views = [...views, { name: `View ${Math.max(0, ...taken) + 1}`, address: this.seen() }];
+  }
+
+  show() {
+    this.list.replaceChildren(...this.views.map((view, i) => {
+      const go = element("button", { type: "button", textContent: view.name });
+      go.addEventListener("click", () => this.go(view.address));
+      const remove = element("button", { type: "button", textContent: "×", className: "remove", ariaLabel: `Remove ${view.name}`, title: "Remove" });
+      remove.addEventListener("click", () => (this.views = this.views.toSpliced(i, 1)));
+      return element("li", {}, go, remove);
+    }));
+  }
+}
