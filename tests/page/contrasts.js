@@ -31,7 +31,9 @@
     const own = words(element);
     const style = getComputedStyle(element);
     const name = `${element.tagName.toLowerCase()}#${element.id}.${element.className} ${own.slice(0, 30)}`;
-    if (own) found.push(["text", worst(style.color, element), name]);
+    // A label of the axes lies on its knob.
+    const knob = element.matches("svg text") && parse(getComputedStyle(element.previousElementSibling).fill);
+    if (own) found.push(["text", knob ? contrast(parse(style.fill), knob) : worst(style.color, element), name]);
     if (element.matches("select, input[type=number], input[type=color]"))
       found.push(["edge", worst(style.borderTopColor, element.parentElement), name]);
     if (element.matches("[role=switch]")) found.push(["switch", worst(style.backgroundColor, element.parentElement), name]);
