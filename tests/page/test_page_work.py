@@ -99,8 +99,8 @@ def test_webgl_has_the_materials_in_the_order_of_the_scene_whatever_their_names(
     found = viewer.page.evaluate(
         """async () => {
             const { Edits } = await import("./static/edits.js");
-            const [materials, lights] = [document.createElement("div"), document.createElement("div")];
-            const edits = new Edits({ materials, lights, changed() {} });
+            const [materials, lights, around] = ["div", "div", "div"].map((tag) => document.createElement(tag));
+            const edits = new Edits({ materials, lights, around, changed() {} });
             const names = ["z9", "7", "1"];
             const own = viewer.scene.materials.map((material, i) => ({ ...material, name: names[i] }));
             edits.load({ ...viewer.scene, materials: own });
