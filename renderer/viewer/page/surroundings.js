@@ -9,7 +9,7 @@ import { COLOR, LIMITS, NUMBER, VECTOR, copy, fits, isColor, same } from "./valu
 const SKY = {
   zenith: [COLOR, "Zenith", [0.35, 0.55, 0.9]], horizon: [COLOR, "Horizon", [0.85, 0.9, 0.95]], ground: [COLOR, "Ground"],
   lights: [NUMBER, "Lights of the sky", 32], sun: [VECTOR, "Direction of the sun's light"], sun_irradiance: [COLOR, "Light of the sun", [1, 1, 1]],
-  sun_angle: [NUMBER, "Sun's radius, degrees", 8], sun_lights: [NUMBER, "Lights of the sun", 16],
+  sun_angle: [NUMBER, "Sun's radius, °", 8], sun_lights: [NUMBER, "Lights of the sun", 16],
 };
 const TINTS = ["zenith", "horizon", "ground"];
 const OF_SUN = ["sun", "sun_irradiance", "sun_angle", "sun_lights"];
@@ -99,7 +99,8 @@ export class Surroundings {
 
   // What is said of it where it is folded.
   get told() {
-    return `${this.now.sky ? "sky" : "colour"}${this.value ? ", changed" : ""}`;
+    if (this.value) return "changed";
+    return this.now.sky ? "sky" : "colour";
   }
 
   switch(label, act) {
