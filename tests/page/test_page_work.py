@@ -12,7 +12,7 @@ from cases import cases
 from viewer_client import seen_by
 from viewer_page import MODELS, SCENE, Viewer, served
 
-from renderer import Mirror, Phong, PointLight, load_scene
+from renderer import Mirror, Phong, PointLight, Sky, load_scene
 from renderer.scene.hide import without
 
 RED = "#materials details[data-name=red]"
@@ -352,6 +352,8 @@ WRONG = [
     {"camera": "0,0,4,0,1,0,0,0", "edits": json.dumps({"materials": {"red": {"type": "phong", "diffuse": "red"}}})},
     {"edits": json.dumps({"lights": [{"type": "point"}], "materials": {"glass": {"type": "dielectric", "ior": 0}}})},
     {"edits": json.dumps({"materials": {"__proto__": {"type": "phong"}, "gold": {"type": "mirror"}}, "lights": [3]})},
+    {"edits": json.dumps({"sky": Sky(sun=(0, -1, 0)).model_dump() | {"lights": 2.5}, "ambient": [-1, 0, 0]})},
+    {"edits": json.dumps({"sky": {"lights": 8}, "background": 0.5})},
     {"edits": "null", "file": "../secret.toml", "unknown": "1"},
 ]
 
