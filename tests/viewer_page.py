@@ -125,7 +125,7 @@ STAYS = """document.addEventListener("readystatechange", () => {
 
 # The panel and all of its parts are open, as a user leaves them who changes settings.
 OPEN = """try {
-    const parts = ["scene", "camera", "traced", "octree", "light", "materials", "objects", "readings"];
+    const parts = ["scene", "camera", "traced", "octree", "light", "around", "materials", "objects", "readings"];
     const open = Object.fromEntries(parts.map((part) => [`fold-${part}`, true]));
     localStorage.setItem("octree-render-folds", JSON.stringify({ panel: true, ...open }));
 } catch {}"""

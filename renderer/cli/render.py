@@ -14,8 +14,8 @@ from renderer.errors import expect
 from renderer.system.terminal import say
 
 _CHANGE = (
-    "replace the camera, the lights, materials or keys of render, such as 'render.shadows = false', or leave objects "
-    'out, such as \'hide = ["objects.0", "floor"]\'; may be given again'
+    "replace the camera, the lights, materials, the ambient light, the background or sky, or keys of render, such as "
+    "'render.shadows = false', or leave objects out, such as 'hide = [\"objects.0\", \"floor\"]'; may be given again"
 )
 _ACCELERATOR = "default: auto, the octree unless there are very few faces; brute tests all faces"
 

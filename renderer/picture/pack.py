@@ -40,7 +40,7 @@ def pack(scene: Scene, needs: Features | None = None) -> tuple[Mesh, SceneArrays
         smooth=np.repeat([i.smooth for i in instances], counts if needs.smooth_normals else 0).astype(np.bool_),
         materials=_materials(scene, needs),
         lights=light_rows(scene, needs),
-        colors=np.array([scene.ambient, scene.background]),
+        colors=_colors(scene),
         sky=sky_rows(scene.sky, scene.up),
         media=media_around(scene, scene.camera) if needs.refraction else np.zeros(0, np.int64),
         touching=np.zeros(0, np.uint8),
@@ -51,11 +51,21 @@ def pack(scene: Scene, needs: Features | None = None) -> tuple[Mesh, SceneArrays
 
 
 def repacked(arrays: SceneArrays, scene: Scene, needs: Features) -> SceneArrays:
-    """``arrays`` with the materials and lights of ``scene``, which has the meshes that they were packed of, and as many
-    materials of the same names.
+    """``arrays`` with the materials and all light of ``scene``, which has the meshes that they were packed of, and as
+    many materials of the same names.
     """
     media = media_around(scene, scene.camera) if needs.refraction else np.zeros(0, np.int64)
-    return arrays._replace(materials=_materials(scene, needs), lights=light_rows(scene, needs), media=media)
+    return arrays._replace(
+        materials=_materials(scene, needs),
+        lights=light_rows(scene, needs),
+        colors=_colors(scene),
+        sky=sky_rows(scene.sky, scene.up),
+        media=media,
+    )
+
+
+def _colors(scene: Scene) -> NDArray[np.float64]:
+    return np.array([scene.ambient, scene.background])
 
 
 def _materials(scene: Scene, needs: Features) -> NDArray[np.float64]:

@@ -57,11 +57,13 @@ def command_of(shown: ShownScene, asked: AskCommand) -> str:
         expect(getattr(settings, switch), "command", f"{switch} as the materials have it", "it switched off")
     scene, path = shown.scene, shown.path
     changes = [f"camera = {_inline(camera_of(asked.m, asked.fovy, height=asked.height))}"]
+    now = edited(scene, settings.edits)
     changes += [
         f"materials.{_value(name)} = {_inline(material)}"
-        for name, material in edited(scene, settings.edits).materials.items()
+        for name, material in now.materials.items()
         if material != scene.materials[name]
     ]
+    changes += _changed_surroundings(scene, now)
     if shown.hidden:
         changes.append(f"hide = {_value(shown.hidden)}")
     if settings.light is not None or settings.edits.lights is not None:
@@ -74,6 +76,16 @@ def command_of(shown: ShownScene, asked: AskCommand) -> str:
     words += ["--accelerator", "brute"] if brute else []
     words += [word for change in changes for word in ("--change", change)]
     return shlex.join([*words, "-o", _as_word(f"{path.stem if path else ''}.png")])
+
+
+def _changed_surroundings(old: Scene, new: Scene) -> Iterator[str]:
+    """Lines of TOML for what is around the scene, where that differs."""
+    if new.ambient != old.ambient:
+        yield f"ambient = {_value(new.ambient)}"
+    if new.sky is None and (new.background, new.sky) != (old.background, old.sky):
+        yield f"background = {_value(new.background)}"
+    if new.sky is not None and new.sky != old.sky:
+        yield f"sky = {_inline(new.sky)}"
 
 
 def _as_word(file: str) -> str:
@@ -115,7 +127,7 @@ class SceneText(NamedTuple):
 
 
 def scene_text(shown: ShownScene, asked: SaveScene) -> SceneText:
-    """The scene's file with the view's camera, materials, lights and settings.
+    """The scene's file with the view's camera, edits and settings.
 
     What is not changed stays as it is written, comments and ends of lines too; so do objects that are hidden. A mesh
     file gets a scene file, all of which is new. Raises ``ValueError`` for a scene of no file, and for a file that
@@ -181,7 +193,8 @@ def _write(document: Any, shown: ShownScene, asked: SaveScene) -> None:
     scene, settings = shown.whole.scene, asked.settings
     if not _same_view(asked, scene.camera):
         _update(document, ("camera",), scene.camera, _seen_by(shown, asked))
-    for name, material in edited(scene, settings.edits).materials.items():
+    now = edited(scene, settings.edits)
+    for name, material in now.materials.items():
         _update(document, ("materials", name), scene.materials[name], material)
     lights = lights_of(shown, settings)
     if len(lights) == len(scene.lights):
@@ -189,9 +202,25 @@ def _write(document: Any, shown: ShownScene, asked: SaveScene) -> None:
             _update(document, ("lights", i), old, new)
     else:
         document["lights"] = [_given(light) for light in lights]
+    _write_surroundings(document, scene, now)
     for key in ("samples", "max_depth", "shadows"):
         if getattr(settings, key) != getattr(scene.render, key):
             document.setdefault("render", {})[key] = getattr(settings, key)
+
+
+def _write_surroundings(document: Any, old: Scene, new: Scene) -> None:
+    """Write what is around the scene; a sky takes the place of a background, and a background of a sky."""
+    if new.ambient != old.ambient:
+        document["ambient"] = list(new.ambient)
+    if new.sky is None:
+        document.pop("sky", None)
+        if new.background != old.background:
+            document["background"] = list(new.background)
+    elif old.sky is None:
+        document.pop("background", None)
+        document["sky"] = _given(new.sky)
+    else:
+        _update(document, ("sky",), old.sky, new.sky)
 
 
 def _update(document: Any, keys: Sequence[str | int], old: Fields, new: Fields) -> None:

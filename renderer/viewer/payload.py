@@ -16,7 +16,6 @@ from renderer.scene.hide import FLOOR, is_side, object_names
 from renderer.scene.light import DirectionalLight, Light
 from renderer.scene.material import Material, material_row
 from renderer.scene.needs import examine
-from renderer.scene.scene import Scene
 from renderer.shade.records import DIFFUSE, MATERIAL_COLUMNS, REFLECTANCE, SHININESS, SPECULAR, TRANSMITTANCE
 from renderer.shade.surface import SceneArrays
 from renderer.viewer.protocol import MODES
@@ -51,8 +50,8 @@ def description(shown: ShownScene) -> dict[str, Any]:
         },
         "lights": [_light(light) for light in scene.lights],
         "ambient": scene.ambient,
-        "background": scene.background if scene.sky is None else scene.sky.horizon,
-        "skylights": [_light(light) for light in _few_lights(scene)],
+        "background": scene.background,
+        "sky": scene.sky and scene.sky.model_dump(exclude_none=True),
         "up": scene.up,
         "needs": {feature: [value, reason] for feature, value, reason in examine(scene)},
         "octree": {
@@ -144,12 +143,6 @@ def _objects(shown: ShownScene) -> list[dict[str, Any]]:
         }
         for name, part in zip(names, parts, strict=False)
     ]
-
-
-def _few_lights(scene: Scene) -> tuple[DirectionalLight, ...]:
-    """Lights that stand for the sky where no shadows are drawn."""
-    few = None if scene.sky is None else scene.sky.model_copy(update={"lights": 4, "sun_lights": 1})
-    return () if few is None else few.directional(scene.up)
 
 
 def _light(light: Light) -> dict[str, Any]:

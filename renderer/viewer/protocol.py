@@ -9,6 +9,7 @@ from renderer.arguments.limits import FARTHEST
 from renderer.scene.camera import sample_offsets
 from renderer.scene.fields import FiniteVector
 from renderer.scene.scene import AnyLight, AnyMaterial
+from renderer.scene.sky import Sky
 
 # The longest side of a picture and the most pixels, those of a screen called 4K, 3840 x 2160, and some more.
 MAX_SIDE, MAX_PIXELS = 4096, 1 << 23
@@ -32,6 +33,8 @@ RGBA, JPEG, FACE_COLORS, PROOF, FILE = 1, 2, 3, 4, 5
 HEADER = struct.Struct("<8I2f")
 
 _Number = Annotated[float, Field(allow_inf_nan=False)]
+_Channel = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+_Color = tuple[_Channel, _Channel, _Channel]
 _Sequence = Annotated[int, Field(ge=0, lt=2**32)]
 _Side = Annotated[int, Field(ge=1, le=MAX_SIDE)]
 _Matrix = Annotated[list[_Number], Field(min_length=16, max_length=16)]
@@ -68,23 +71,28 @@ class _Sized(_Message):
 
 
 class Edits(_Message):
-    """The page's changes of the file: materials by their names, and all lights or null for the file's."""
+    """The page's changes of the file: materials by their names, and for each of the others null for the file's. A
+    background takes the place of the file's sky, and a sky that of its background.
+    """
 
     materials: Annotated[dict[str, AnyMaterial], Field(max_length=MAX_EDITS)] = {}
     lights: Annotated[tuple[AnyLight, ...], Field(max_length=MAX_EDITS)] | None = None
+    ambient: _Color | None = None
+    background: _Color | None = None
+    sky: Sky | None = None
 
     @property
     def any(self) -> bool:
         """Whether there are changes."""
-        return bool(self.materials) or self.lights is not None
+        return self != Edits()
 
 
 class ViewSettings(_Message):
     """The settings of the panel. ``light`` is the direction in which the first directional light travels, null for the
     scene's own; ``aov`` the value that a pixel shows; ``pixels`` the format in which pictures are sent; ``pair`` what a
     proof compares: the octree and "brute" force, few and many "samples", or the octree and the reference of that name;
-    ``refine`` the samples per pixel up to which the picture of a camera at rest grows; ``edits`` the materials and
-    lights that differ from the file's.
+    ``refine`` the samples per pixel up to which the picture of a camera at rest grows; ``edits`` what of the scene
+    differs from the file.
     """
 
     max_depth: Annotated[int, Field(ge=0, le=64)] = 6

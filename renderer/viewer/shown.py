@@ -13,6 +13,7 @@ from renderer.picture.pack import light_rows, repacked
 from renderer.picture.prepare import PreparedScene, build_octree, prepare_scene, tree_for
 from renderer.precompile import touch_viewing
 from renderer.scene.camera import unit
+from renderer.scene.change import surroundings
 from renderer.scene.hide import is_side, object_names, without
 from renderer.scene.needs import Features, needs_of
 from renderer.scene.scene import RenderSettings, Scene, load_scene, mesh_files
@@ -192,15 +193,19 @@ def _expect_no_pipe(path: Path) -> None:
 
 
 def edited(scene: Scene, edits: Edits) -> Scene:
-    """``scene`` with the materials and lights of ``edits``. Raises ``ValueError`` for a material that it has not."""
+    """``scene`` with what ``edits`` change. Raises ``ValueError`` for a material that it has not, and for a background
+    beside a sky.
+    """
     for name in edits.materials:
         expect(name in scene.materials, "edits.materials", f"names among {sorted(scene.materials)}", repr(name))
     lights = scene.lights if edits.lights is None else edits.lights
-    return scene.altered(materials={**scene.materials, **edits.materials}, lights=lights)
+    changes = surroundings(edits.ambient, edits.background, edits.sky)
+    changes |= {"materials": {**scene.materials, **edits.materials}, "lights": lights}
+    return scene.altered(**changes)
 
 
 def _edited(prepared: PreparedScene, edits: Edits) -> PreparedScene:
-    """``prepared`` with other materials and lights, over the same tree."""
+    """``prepared`` with other materials and other light, over the same tree."""
     if not edits.any:
         return prepared
     scene = edited(prepared.scene, edits)
@@ -218,8 +223,8 @@ def _edited(prepared: PreparedScene, edits: Edits) -> PreparedScene:
 
 
 def varied(prepared: PreparedScene, settings: ViewSettings) -> PreparedScene:
-    """``prepared`` with the materials and lights of ``settings``, without the features that they switch off, and with
-    its first directional light turned.
+    """``prepared`` with the edits of ``settings``, without the features that they switch off, and with its first
+    directional light turned.
 
     No tree is rebuilt. Lights that are dark do not count, and without a directional light none is turned.
     """

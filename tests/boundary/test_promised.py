@@ -540,7 +540,7 @@ def test_the_command_view_shows_a_mesh_file_and_opens_a_browser_unless_told_not_
     assert opened == ([url] if browser else [])
     # A floor of two triangles is put under the mesh.
     own = trimesh.load_mesh(BLOCK, process=False)
-    assert told["name"] == "block.ply" and told["faces"] == len(own.faces) + 2 and len(told["skylights"]) == 5
+    assert told["name"] == "block.ply" and told["faces"] == len(own.faces) + 2 and told["sky"]["lights"] == 96
 
 
 @pytest.mark.judges("view")

@@ -12,7 +12,7 @@ from cases import cases
 from viewer_client import seen_by
 from viewer_page import MODELS, SCENE, Viewer, served
 
-from renderer import Mirror, Phong, PointLight, load_scene
+from renderer import Mirror, Phong, PointLight, Sky, load_scene
 from renderer.scene.hide import without
 
 RED = "#materials details[data-name=red]"
@@ -99,8 +99,8 @@ def test_webgl_has_the_materials_in_the_order_of_the_scene_whatever_their_names(
     found = viewer.page.evaluate(
         """async () => {
             const { Edits } = await import("./static/edits.js");
-            const [materials, lights] = [document.createElement("div"), document.createElement("div")];
-            const edits = new Edits({ materials, lights, changed() {} });
+            const [materials, lights, around] = ["div", "div", "div"].map((tag) => document.createElement(tag));
+            const edits = new Edits({ materials, lights, around, changed() {} });
             const names = ["z9", "7", "1"];
             const own = viewer.scene.materials.map((material, i) => ({ ...material, name: names[i] }));
             edits.load({ ...viewer.scene, materials: own });
@@ -375,6 +375,8 @@ WRONG = [
     {"camera": "0,0,4,0,1,0,0,0", "edits": json.dumps({"materials": {"red": {"type": "phong", "diffuse": "red"}}})},
     {"edits": json.dumps({"lights": [{"type": "point"}], "materials": {"glass": {"type": "dielectric", "ior": 0}}})},
     {"edits": json.dumps({"materials": {"__proto__": {"type": "phong"}, "gold": {"type": "mirror"}}, "lights": [3]})},
+    {"edits": json.dumps({"sky": Sky(sun=(0, -1, 0)).model_dump() | {"lights": 2.5}, "ambient": [-1, 0, 0]})},
+    {"edits": json.dumps({"sky": {"lights": 8}, "background": 0.5})},
     {"edits": "null", "file": "../secret.toml", "unknown": "1"},
 ]
 

@@ -65,6 +65,10 @@ def test_what_is_hidden_is_left_out_and_the_rest_is_not_placed_again(hidden: lis
         ("camera = {eye = [0, 0, 1]}", "camera"),
         ("lights = [{type = 'sun'}]", "lights"),
         ("camera = 3", "camera"),
+        ("ambient = -1", "ambient.0: expected a number greater than or equal to 0"),
+        ("background = [1, 2]", "background.2: expected a value"),
+        ("sky.lights = 5000", "sky.lights: expected a number less than or equal to 4096, got 5000"),
+        ("background = 1\nsky = {}", "background: expected none beside a sky"),
     ],
 )
 def test_what_is_wrong_is_said_on_one_line(text: str, said: str) -> None:

@@ -9,7 +9,7 @@ import tomlkit
 from cases import cases
 from varied import BASE, VARIATIONS, Table, Variation, picture, scene_of
 
-from renderer import Hits, Mesh, Octree, RenderSettings, Scene
+from renderer import Hits, Mesh, Octree, RenderSettings, Scene, Sky
 from renderer.cli.main import main
 from renderer.scene.camera import Camera
 from renderer.scene.change import _Changes, changed
@@ -35,15 +35,15 @@ def shot(scene: Scene) -> Hits:
 
 
 def text_of(other: Variation) -> str:
-    """The change: a camera, a material or the lights whole, or a key of ``render`` alone."""
-    top, name = other.keys[0], other.keys[1]
+    """The change: a material or a key of ``render`` alone, or all that stands under another key."""
+    top, *rest = other.keys
     whole = other.varied()[top]
-    return tomlkit.dumps({top: {name: whole[name]} if top in ("materials", "render") else whole})
+    return tomlkit.dumps({top: {rest[0]: whole[rest[0]]} if top in ("materials", "render") else whole})
 
 
 def test_every_table_that_can_be_changed_is_varied_in_each_of_its_types() -> None:
     assert {other.keys[0] for other in CHANGED} == _Changes.model_fields.keys() - {"hide"}
-    types = {RenderSettings, *get_args(Camera), *get_args(Light), *get_args(Material)}
+    types = {RenderSettings, Scene, Sky, *get_args(Camera), *get_args(Light), *get_args(Material)}
     assert {other.record for other in CHANGED} == types
 
 
@@ -68,6 +68,19 @@ def test_what_is_cut_off_is_not_seen_and_all_else_is(folder: Path, side: str) ->
     assert (left.t[gone] > whole.t[gone] - 1e-9).all()
     beyond = left.points[left.hit, "xyz".index(axis)] - float(at)
     assert (beyond * (1 if sign == ">" else -1) <= 1e-9).all()
+
+
+UNDER_SKY = next(other.table for other in VARIATIONS if other.keys[0] == "sky" and len(other.keys) > 1)
+# A table with the one, and a table with the other in its place.
+SWAPS = [("background", UNDER_SKY, BASE), ("sky", BASE, UNDER_SKY)]
+
+
+@cases(("top", "before", "after"), SWAPS)
+def test_a_background_takes_the_place_of_a_sky_and_a_sky_of_a_background(
+    folder: Path, top: str, before: Table, after: Table
+) -> None:
+    found = written_by(folder, before, tomlkit.dumps({top: after[top]}))
+    assert found.tobytes() == picture(scene_of(folder, after)).radiance.tobytes()
 
 
 @cases("name", ["objects.0", "objects.1", "objects.2", "floor"])

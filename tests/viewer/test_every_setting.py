@@ -37,7 +37,7 @@ from renderer.viewer import compare, passes
 from renderer.viewer import shown as shown_module
 from renderer.viewer.compare import compared
 from renderer.viewer.passes import passes_of
-from renderer.viewer.protocol import ViewSettings
+from renderer.viewer.protocol import Edits, ViewSettings
 from renderer.viewer.shown import ShownScene, open_file
 
 
@@ -65,7 +65,12 @@ def into(*keys: Any, value: Any) -> Callable[[Table], None]:
 
 GLASS, MIRROR = BASE["materials"]["glass"], BASE["materials"]["steel"]
 SUN, LAMP = BASE["lights"][:2]
-EDITS: Table = {"materials": {"wax": GLASS, "glass": MIRROR}, "lights": [LAMP]}
+EDITS: Table = {
+    "materials": {"wax": GLASS, "glass": MIRROR},
+    "lights": [LAMP],
+    "ambient": [0.5, 0.1, 0.2],
+    "background": [0.8, 0.1, 0.3],
+}
 TURNED = [0.7, -0.9, -0.2]
 DARK = SUN | {"irradiance": [0.0, 0.0, 0.0]}
 # Settings that differ from those that a page begins with, and how the file has to say so.
@@ -78,7 +83,7 @@ SETTINGS: dict[str, tuple[Table, Callable[[Table], None]]] = {
     "light": ({"light": TURNED}, into("lights", 0, "direction", value=TURNED)),
     "edits": (
         {"edits": EDITS},
-        lambda table: table.update(materials=table["materials"] | EDITS["materials"], lights=[LAMP]),
+        lambda table: table.update(EDITS | {"materials": table["materials"] | EDITS["materials"]}),
     ),
     # The first that shines is turned.
     "dark": (
@@ -137,17 +142,42 @@ def test_a_setting_holds_for_an_eye_in_two_bodies(folder: Path, shown: ShownScen
     assert same(way(case))
 
 
-EDITED = [other for other in VARIATIONS if other.keys[0] in ("materials", "lights")]
+EDITED = [other for other in VARIATIONS if other.keys[0] in Edits.model_fields]
 
 
 @cases("other", EDITED)
 def test_each_field_that_is_edited_is_shown_and_written(folder: Path, shown: ShownScene, other: Variation) -> None:
-    """A saved camera has the lights too, but no materials."""
-    table, kind, name = other.varied(), other.keys[0], other.keys[1]
-    edits = {"lights": table["lights"]} if kind == "lights" else {"materials": {name: table["materials"][name]}}
+    """A saved camera has the lights too, but no materials. A sky takes the place of the file's background."""
+    table, kind = other.varied(), other.keys[0]
+    edits = {kind: {other.keys[1]: table[kind][other.keys[1]]} if kind == "materials" else table[kind]}
     case = Case(shown, page_of(shown.scene) | {"edits": edits}, scene_of(folder, table)).seen()
     for way in (octree, command, save, *([save_camera] if kind == "lights" else [])):
         assert same(way(case)), way
+
+
+SKY = [other for other in EDITED if other.keys[0] == "sky"]
+
+
+@pytest.fixture(scope="module")
+def under_sky(folder: Path) -> ShownScene:
+    """The scene with a sky, in a file that stays as it is."""
+    (folder / "sky.toml").write_text(tomlkit.dumps(SKY[-1].table))
+    return open_file(folder / "sky.toml")
+
+
+@cases("other", SKY)
+def test_each_field_of_a_sky_is_shown_and_written(folder: Path, under_sky: ShownScene, other: Variation) -> None:
+    table = other.varied()
+    case = Case(under_sky, page_of(under_sky.scene) | {"edits": {"sky": table["sky"]}}, scene_of(folder, table)).seen()
+    for way in (octree, command, save):
+        assert same(way(case)), way
+
+
+@cases("way", [*WAYS, command, save])
+def test_a_background_takes_the_place_of_the_files_sky(folder: Path, under_sky: ShownScene, way: Any) -> None:
+    edits = {"background": BASE["background"]}
+    case = Case(under_sky, page_of(under_sky.scene) | {"edits": edits}, scene_of(folder, BASE)).seen()
+    assert same(way(case))
 
 
 @cases("way", [*WAYS, *WRITTEN])

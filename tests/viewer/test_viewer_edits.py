@@ -27,8 +27,8 @@ from renderer.scene.scene import Floor
 from renderer.viewer import session
 from renderer.viewer.commands import saved as camera_text
 from renderer.viewer.commands import scene_text
-from renderer.viewer.protocol import SaveCamera, SaveScene
-from renderer.viewer.shown import ShownScene, open_file
+from renderer.viewer.protocol import Edits, SaveCamera, SaveScene
+from renderer.viewer.shown import ShownScene, edited, open_file
 from renderer.viewer.viewpoint import camera_of
 
 COMMENTED = f"# kept\n{SCENE.replace('shininess = 40', 'shininess = 40 # like wax')}"
@@ -94,6 +94,9 @@ def test_no_tree_is_built_for_other_materials(url: str, client: Client, monkeypa
         ({"materials": {"red": {"type": "wood"}}}, "settings.edits.materials.red"),
         ({"lights": [{"type": "directional", "direction": [0, 0, 0]}]}, "settings.edits.lights.0"),
         ({"camera": {}}, "settings.edits.camera"),
+        ({"ambient": [0, -1, 0]}, "settings.edits.ambient.1: Input should be greater than or equal to 0, got -1"),
+        ({"sky": {"lights": 5000}}, "settings.edits.sky.lights: Input should be less than or equal to 4096, got 5000"),
+        ({"sky": {}, "background": [1, 1, 1]}, "background: expected none beside a sky, got (1.0, 1.0, 1.0)"),
     ],
 )
 def test_what_is_no_edit_is_refused_on_one_line(client: Client, edits: dict[str, Any], said: str) -> None:
@@ -214,6 +217,33 @@ def test_lights_that_come_and_go_are_saved(client: Client, scene: Path, number: 
     again = load_scene(copy)
     copy.unlink()
     assert again.lights == (LAMP,) * number and again.floor == load_scene(scene).floor
+
+
+AROUND = ["ambient = 0.1", "background = [0.45, 0.62, 0.82]"]
+NO_SKY = SCENE.replace("\n".join(AROUND), "[sky] # mine\nlights = 8")
+
+
+@cases(
+    ("text", "edits", "lines"),
+    [
+        (SCENE, {"sky": {"lights": 0}}, ["+[sky]", "-background"]),
+        (SCENE, {"background": [0.5, 0.25, 0.0]}, ["+background = [0.5, 0.25, 0.0]", "-background"]),
+        (NO_SKY, {"background": [0.5, 0.25, 0.0]}, ["+background = [0.5, 0.25, 0.0]", "-[sky]", "-lights = 8"]),
+        (NO_SKY, {"background": [0.0, 0.0, 0.0]}, ["-[sky]", "-lights = 8"]),
+        (NO_SKY, {"sky": {"lights": 9}, "ambient": [0.5, 0.25, 0.0]}, ["+ambient", "+lights = 9", "-lights = 8"]),
+    ],
+)
+def test_what_is_around_the_scene_is_saved(tmp_path: Path, text: str, edits: dict[str, Any], lines: list[str]) -> None:
+    """In the tables of the file, before the first of which other keys stand."""
+    file = tmp_path / "a.toml"
+    file.write_text(text)
+    shown = open_file(file)
+    after, diff = text_of(shown, looking((0.5, 2.6, 5.5)), edits)
+    changed = [line for line in diff.splitlines() if line[0] in "+-" and line[:3] not in ("+++", "---")]
+    for line in lines:
+        assert any(found.startswith(line) for found in changed), (line, diff)
+    file.write_text(after)
+    assert load_scene(file) == edited(shown.scene, Edits.model_validate_json(json.dumps(edits)))
 
 
 def test_a_mesh_file_is_saved_as_the_scene_that_is_seen(tmp_path: Path) -> None:

@@ -1,9 +1,10 @@
-// Materials and lights as the user changes them: their lists in the panel, and what differs from the scene's file.
+// Materials, lights and surroundings as the user changes them: their lists in the panel, and what differs from the file.
 import { element, swatch } from "./element.js";
 import { numberField, pickerColor, vectorField } from "./fields.js";
 import { MAX_LIGHTS } from "./model.js";
+import { Surroundings } from "./surroundings.js";
+import { COLOR, LIMITS, NUMBER, VECTOR, copy, fits, same } from "./values.js";
 
-const [COLOR, VECTOR, NUMBER] = ["color", "vector", "number"];
 // The fields of each type in the order in which they are shown, with their kind and what a new one has.
 const MATERIALS = {
   phong: { diffuse: [COLOR, [0.8, 0.8, 0.8]], ambient: [COLOR, null], specular: [COLOR, [0, 0, 0]], shininess: [NUMBER, 32],
@@ -15,31 +16,15 @@ const LIGHTS = {
   directional: { direction: [VECTOR, [-0.5, -1, -0.5]], irradiance: [COLOR, [0.5, 0.5, 0.5]] },
   point: { position: [VECTOR, null], intensity: [COLOR, null] },
 };
-// The least that numbers may be; an index of refraction is more than nothing.
-const LEAST = { shininess: 0, ior: 1e-6 };
 const BLACK = [0, 0, 0];
 // By which colour a material is known.
 const CHIEF = { phong: "diffuse", mirror: "reflectance", dielectric: "transmittance" };
 
-const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
-const copy = (value) => JSON.parse(JSON.stringify(value));
-
-const finite = (x) => typeof x === "number" && Number.isFinite(x);
-const three = (value, allowed) => Array.isArray(value) && value.length === 3 && value.every((x) => finite(x) && allowed(x));
-// The fields that may be missing, and what the server takes as a field.
-const OPTIONAL = ["ambient"];
-const TAKEN = {
-  [COLOR]: (value) => three(value, (x) => x >= 0),
-  [VECTOR]: (value, name) => three(value, () => true) && (name !== "direction" || value.some((x) => x !== 0)),
-  [NUMBER]: (value, name) => finite(value) && (name === "ior" ? value > 0 : value >= 0),
-};
-
-// Whether fields from an address are all those of one of `types`, no others, and of values that the server takes.
-function fits(fields, types) {
+// Whether fields from an address are those of one of `types`, and of values that the server takes.
+function isOneOf(types, fields) {
   if (!Object.hasOwn(types, fields?.type)) return false;
-  const { type, ...given } = fields, known = types[type];
-  return Object.keys(given).every((name) => Object.hasOwn(known, name)) &&
-    Object.entries(known).every(([name, [kind]]) => (given[name] === undefined ? OPTIONAL.includes(name) : TAKEN[kind](given[name], name)));
+  const { type, ...given } = fields;
+  return fits(given, types[type]);
 }
 
 const shines = (light) => light.type === "directional" && light.irradiance.some((x) => x > 0);
@@ -51,12 +36,16 @@ const lightFields = (light) => {
 
 export class Edits {
   // `changed()` is called after each change.
-  constructor({ materials, lights, changed }) {
+  constructor({ materials, lights, around, changed }) {
     this.lists = { materials, lights };
     this.changed = () => {
       this.summarise();
       changed();
     };
+    this.around = new Surroundings(around, () => {
+      this.showLights(); // of which the preview draws fewer under a sky
+      this.changed();
+    });
     for (const list of [materials, lights]) list.addEventListener("input", (event) => event.stopPropagation());
   }
 
@@ -66,6 +55,7 @@ export class Edits {
     this.own = { materials: Object.fromEntries(scene.materials.map((m) => [m.name, m.fields])), lights: scene.lights.map(lightFields) };
     this.now = copy(this.own);
     this.left = new Map(); // of each material, by its name and a type, the fields that were left
+    this.around.load(scene);
     this.show();
   }
 
@@ -89,14 +79,16 @@ export class Edits {
   get value() {
     const materials = Object.entries(this.now.materials).filter(([name, fields]) => !same(fields, this.own.materials[name]));
     const lights = same(this.now.lights, this.own.lights) ? {} : { lights: this.now.lights };
-    return materials.length || lights.lights ? { materials: Object.fromEntries(materials), ...lights } : null;
+    const around = this.around.value;
+    return materials.length || lights.lights || around ? { materials: Object.fromEntries(materials), ...lights, ...around } : null;
   }
 
   // Take edits over, as far as this scene has what they are of.
   set value(given) {
     for (const [name, fields] of Object.entries(given?.materials ?? {}))
-      if (Object.hasOwn(this.own.materials, name) && fits(fields, MATERIALS)) this.now.materials[name] = copy(fields);
-    if (Array.isArray(given?.lights) && given.lights.every((light) => fits(light, LIGHTS))) this.now.lights = copy(given.lights);
+      if (Object.hasOwn(this.own.materials, name) && isOneOf(MATERIALS, fields)) this.now.materials[name] = copy(fields);
+    if (Array.isArray(given?.lights) && given.lights.every((light) => isOneOf(LIGHTS, light))) this.now.lights = copy(given.lights);
+    this.around.value = given ?? {};
     this.show();
   }
 
@@ -106,12 +98,12 @@ export class Edits {
     return this.scene.materials.map(({ name }) => [name, this.now.materials[name]]);
   }
 
-  // The scene with these materials and lights, as WebGL draws it.
+  // The scene with all this, as WebGL draws it.
   get dressed() {
     const materials = this.named.map(([name, fields]) => ({ name, diffuse: BLACK, specular: BLACK,
       reflectance: BLACK, transmittance: BLACK, shininess: 0, ...fields, fields }));
     const lights = this.now.lights.map((fields) => ({ ...fields, color: fields.irradiance ?? fields.intensity }));
-    return { ...this.scene, materials, lights: [...lights, ...this.scene.skylights] };
+    return { ...this.scene, ...this.around.dressed, materials, lights: [...lights, ...this.around.skylights] };
   }
 
   show() {
@@ -128,7 +120,7 @@ export class Edits {
     const { lights } = this.now;
     this.entries = new Map(lights.map((fields, i) => [fields, this.light(fields, i, fields === added || before.get(fields)?.open)]));
     const add = (type) => this.button(`Add ${type} light`, () => this.addLight(type));
-    const dark = lights.length - (MAX_LIGHTS - this.scene.skylights.length);
+    const dark = lights.length - (MAX_LIGHTS - this.around.skylights.length);
     const note = element("p", { className: "note", hidden: dark <= 0, textContent: `Preview draws the first ${lights.length - dark} of these.` });
     this.lists.lights.replaceChildren(...this.entries.values(), note, element("div", { className: "buttons" }, add("directional"), add("point")));
   }
@@ -168,7 +160,7 @@ export class Edits {
         fields[name] = value;
         this.changed();
       };
-      if (kind === NUMBER) return numberField(name, fields[name], LEAST[name], set);
+      if (kind === NUMBER) return numberField(name, fields[name], LIMITS[name], set);
       return vectorField(name, fields[name], { isColor: kind === COLOR, isDirection: name === "direction" }, set);
     });
   }

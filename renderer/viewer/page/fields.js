@@ -1,4 +1,4 @@
-// Controls for numbers and colours of materials and lights.
+// Controls for numbers and colours of materials, lights and surroundings.
 import { element } from "./element.js";
 
 const linear = (code) => (code <= 0.04045 ? code / 12.92 : ((code + 0.055) / 1.055) ** 2.4);
@@ -17,13 +17,14 @@ export const pickedColor = (color, before) =>
 // What is wrong with a number that was entered, "" for nothing.
 function faultOf(input) {
   if (input.value === "" || !Number.isFinite(input.valueAsNumber)) return "Expected a number";
-  return input.checkValidity() ? "" : `Expected at least ${input.min}`;
+  const { rangeUnderflow, rangeOverflow, stepMismatch } = input.validity;
+  const parts = [rangeUnderflow && `at least ${input.min}`, rangeOverflow && `at most ${input.max}`, stepMismatch && "a whole number"];
+  const expected = parts.find(Boolean);
+  return expected ? `Expected ${expected}` : "";
 }
 
-function numberInput(value, label, least) {
-  const input = element("input", { type: "number", step: "any", defaultValue: value, ariaLabel: label });
-  if (least !== undefined) input.min = least;
-  return input;
+function numberInput(value, label, { least = "", most = "", whole = false }) {
+  return element("input", { type: "number", step: whole ? 1 : "any", min: least, max: most, defaultValue: value, ariaLabel: label });
 }
 
 // The line that says what is wrong with some inputs. `taken()` is called when all are right, or returns what is wrong
@@ -51,9 +52,9 @@ function guard(inputs, taken) {
   return { line, keep: () => (right = inputs.map((input) => input.value)) };
 }
 
-// A number `value` of at least `least`; `changed(value)` is called with what the user enters, if it is one.
-export function numberField(name, value, least, changed) {
-  const input = numberInput(value, name, least);
+// A number `value` within `limits`, {least, most, whole}; `changed(value)` is called with what the user enters, if it is one.
+export function numberField(name, value, limits, changed) {
+  const input = numberInput(value, name, limits);
   const { line } = guard([input], () => void changed(input.valueAsNumber));
   return element("div", {}, element("label", { className: "row" }, element("span", { textContent: name }), input), line);
 }
@@ -61,7 +62,7 @@ export function numberField(name, value, least, changed) {
 // Three numbers, and for a colour a picker too; a direction has a length.
 export function vectorField(name, value, { isColor, isDirection }, changed) {
   const axes = isColor ? ["red", "green", "blue"] : ["x", "y", "z"];
-  const inputs = value.map((x, i) => numberInput(x, `${name}, ${axes[i]}`, isColor ? 0 : undefined));
+  const inputs = value.map((x, i) => numberInput(x, `${name}, ${axes[i]}`, isColor ? { least: 0 } : {}));
   let current = value;
   const take = (next) => {
     current = next;

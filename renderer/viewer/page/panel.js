@@ -23,7 +23,7 @@ export class Panel {
     this.fields = this.form.elements;
     this.folds = new Folds(document.querySelector("#panel"), document.querySelector("#toggle-panel"));
     const find = (id) => document.querySelector(id);
-    this.edits = new Edits({ materials: find("#materials"), lights: find("#lights"), changed: () => {
+    this.edits = new Edits({ materials: find("#materials"), lights: find("#lights"), around: find("#around"), changed: () => {
       this.showLight();
       this.showValues();
       changed("edits");
@@ -159,7 +159,9 @@ export class Panel {
     folds.tell("traced", `${samples} ${samples === 1 ? "sample" : "samples"}, ${fields.max_depth.value} bounces`);
     folds.tell("octree", fields.boxes.checked ? `level ${fields.level.value}` : `${scene.octree.levels} levels`);
     folds.tell("light", count(edits.now.lights.length));
-    folds.tell("materials", `${count(scene.materials.length)}${edits.value ? ", changed" : ""}`);
+    folds.tell("around", edits.around.told);
+    const edited = Object.keys(edits.value?.materials ?? {}).length;
+    folds.tell("materials", `${count(scene.materials.length)}${edited ? ", changed" : ""}`);
     const hidden = scene.objects.filter(({ shown }) => !shown).length;
     folds.tell("objects", hidden ? `${scene.objects.length - hidden} of ${scene.objects.length}` : count(scene.objects.length));
   }
