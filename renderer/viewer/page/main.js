@@ -4,6 +4,7 @@ import { Camera } from "./camera.js";
 import { Connection, FACE_COLORS, PROOF, fetchFrom } from "./connection.js";
 import { Controls } from "./controls.js";
 import { film } from "./film.js";
+import { Drop } from "./drop.js";
 import { heading } from "./element.js";
 import { GlLayer } from "./gl.js";
 import { Busy } from "./busy.js";
@@ -110,6 +111,7 @@ class Viewer {
     bindKeys(this);
     returnKeys(this.stage);
     this.bindButtons();
+    this.drop = new Drop(this, { button: find("#open-files"), input: find("#files"), target: find("#drop") });
     new ResizeObserver(() => this.layout()).observe(this.stage);
     document.body.dataset.ready = "true";
   }
