@@ -19,7 +19,8 @@ from viewer_client import PATIENCE, Client, fetched, wait_for
 from viewer_page import MODELS, SCENE, served
 
 import renderer
-from renderer.viewer import drops
+from renderer.viewer import app, drops
+from renderer.viewer.shown import open_file
 
 BLOCK, STAIRS = ((MODELS / name).read_bytes() for name in ("block.ply", "stairs.ply"))
 # As a user has it: with its meshes in a folder beside it.
@@ -247,3 +248,15 @@ def test_its_folder_ends_with_a_command_that_is_ended(temporary: Path, scene: Pa
     with served(scene) as url:
         assert posted(url, {"t.ply": TRIANGLE})[0] == 200 and files_in(temporary) == ["t.ply"]
     assert files_in(temporary) == []
+
+
+def test_what_was_dropped_is_read_once_for_its_page(url: str, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And anew where that asks for it again."""
+    read: list[str] = []
+    monkeypatch.setattr(app, "open_file", lambda path, up=None: (read.append(path.name), open_file(path, up))[1])
+    posted(url, {"t.ply": TRIANGLE})
+    shown = []
+    for _ in range(2):
+        client.send(type="scene", file="t.ply")
+        shown.append(client.told("scene")["id"])
+    assert read == ["t.ply", "t.ply"] and shown[0] != shown[1]
