@@ -10,7 +10,7 @@ import base64
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeGuard
 from urllib.parse import unquote
 
 import numpy as np
@@ -74,6 +74,14 @@ def parse_gltf(content: bytes, reading: Reading | None = None, folder: Path | No
         raise MeshError(f"malformed glTF: {type(error).__name__}: {fault}") from error
 
 
+def buffer_names(content: bytes) -> list[str]:
+    """The names of the files that a glTF file's content has its buffers in. Raises ``MeshError``."""
+    buffers = _document(content)[0].get("buffers")
+    entries = buffers if isinstance(buffers, list) else []
+    uris = [entry.get("uri") for entry in entries if isinstance(entry, dict)]
+    return [unquote(uri) for uri in uris if _names_file(uri)]
+
+
 def _document(content: bytes) -> tuple[dict[str, Any], bytes | None]:
     """The JSON document, and the binary chunk of a GLB."""
     text, binary = content, None
@@ -120,6 +128,10 @@ def _buffers(document: dict[str, Any], binary: bytes | None, folder: Path | None
     return [_buffer(number, buffer, binary, folder) for number, buffer in enumerate(document.get("buffers") or [])]
 
 
+def _names_file(uri: object) -> TypeGuard[str]:
+    return isinstance(uri, str) and not uri.startswith("data:") and "://" not in uri
+
+
 def _buffer(number: int, buffer: dict[str, Any], binary: bytes | None, folder: Path | None) -> bytes:
     uri = buffer.get("uri")
     if uri is None and number == 0 and binary is not None:
@@ -127,7 +139,7 @@ def _buffer(number: int, buffer: dict[str, Any], binary: bytes | None, folder: P
     if isinstance(uri, str) and uri.startswith("data:"):
         _, _, data = uri.partition(",")
         return base64.b64decode(unquote(data))
-    if not isinstance(uri, str) or folder is None or "://" in uri:
+    if not _names_file(uri) or folder is None:
         raise MeshError(f"glTF: expected the bytes of buffer {number}, got {str(uri)[:80]!r}")
     try:
         return read_whole(folder / unquote(uri))

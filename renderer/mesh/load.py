@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from renderer.errors import MeshError, NoSuchMeshError
-from renderer.mesh.gltf import parse_gltf
+from renderer.mesh.gltf import buffer_names, parse_gltf
 from renderer.mesh.mesh import Mesh, RepairWarning
 from renderer.mesh.obj import parse_obj
 from renderer.mesh.ply import format_ply, parse_ply
@@ -126,6 +126,17 @@ def mesh_suffix(path: Path) -> str | None:
     last = path.suffix.lower()
     found = Path(path.stem).suffix.lower() if last == ".gz" else last
     return found if found in MESH_SUFFIXES else None
+
+
+def buffer_files(path: Path) -> list[Path]:
+    """The files of buffers that a mesh file names, none of which is read. Raises ``MeshError``."""
+    if mesh_suffix(path) not in Y_UP:
+        return []
+    _, _, content, _ = _read(path)
+    try:
+        return [path.parent / name for name in buffer_names(content.removeprefix(BOM_UTF8))]
+    except MeshError as error:
+        raise MeshError(f"{path}: {error}") from error
 
 
 def _unpacked(content: bytes) -> bytes:

@@ -20,6 +20,7 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from renderer.viewer.drops import MOST_BYTES, SUFFIXES, Drops, arrange
 from renderer.viewer.payload import Payload, boxes_payload, description, mesh_payload
 from renderer.viewer.security import ResponseHeaders, SameOrigin, TokenRequired, allowed_hosts
 from renderer.viewer.session import Connection, Session
@@ -49,11 +50,40 @@ class Viewer:
         # One file is computed at a time, for whichever page: each takes some 100 MB and all processors.
         self.files: Executor = ThreadPoolExecutor(1, "viewer-files")
         self._one_opens = asyncio.Lock()
+        self._drops = Drops()
+        self._dropped: ShownScene | None = None  # the last one, until its page opens it
 
     async def open(self, file: str, fresh: bool) -> ShownScene:
         """The scene of one of the files offered, as ``SceneHost`` says."""
         async with self._one_opens:
-            return self._kept(await run_in_threadpool(_opened, self.shown, self._known(), file, fresh))
+            dropped, self._dropped = self._dropped, None
+            if dropped is not None and dropped.name == file:
+                return dropped
+            return self._kept(await run_in_threadpool(self._opened, file, fresh))
+
+    def _opened(self, file: str, fresh: bool) -> ShownScene:
+        """The scene of ``file``: one that is shown and up to date, or a new one; always that if ``fresh``."""
+        path = self._path(file, fresh)
+        if path is None:
+            return self.shown
+        return _loaded(self._known(), path) if fresh else _unedited(self._known(), path)
+
+    def _path(self, file: str, fresh: bool) -> Path | None:
+        """The path of one of ``files``, which any other file is an error for if ``fresh``, and else the server's own;
+        None for a scene made in Python.
+        """
+        own = self.shown
+        if file in self._drops.paths:
+            return self._drops.paths[file]
+        if own.path is None and (not fresh or file in self.offered):
+            return None
+        return own.beside(file) if fresh or file in own.files else own.path
+
+    @property
+    def offered(self) -> list[str]:
+        """The files that pages may open: the server's own and those beside it, then those that were dropped."""
+        dropped = self._drops.paths
+        return [*(self.shown.files or [self.shown.name] * bool(dropped)), *dropped]
 
     async def reload(self, shown: ShownScene) -> ShownScene:
         """The scene of the file of ``shown`` as it is now, as ``SceneHost`` says."""
@@ -77,6 +107,10 @@ class Viewer:
             self._scenes[shown.id] = shown
             return shown
 
+    def is_dropped(self, shown: ShownScene) -> bool:
+        """As ``SceneHost`` says."""
+        return shown.path in self._drops.paths.values()
+
     def _asked_for(self, request: Request) -> ShownScene:
         """The scene with the id of the request, by default the server's own. Raises a 404 if it is gone."""
         wanted = request.query_params.get("id", self.shown.id)
@@ -87,7 +121,23 @@ class Viewer:
     async def description(self, request: Request) -> Response:
         """GET /scene?id=ID."""
         told = await run_in_threadpool(description, self._asked_for(request))
-        return JSONResponse(told | {"server": self.id})
+        files = await run_in_threadpool(lambda: self.offered)
+        return JSONResponse(
+            told | {"server": self.id, "files": files, "drop": {"most": MOST_BYTES, "suffixes": SUFFIXES}}
+        )
+
+    async def drop(self, request: Request) -> Response:
+        """POST /drop?files=[[NAME, BYTES], ...], with the files one after the other: the name of the scene to open."""
+        listed = request.query_params.get("files", "")
+        try:
+            async with self._drops.received(listed, request.stream()) as arrived, self._one_opens:
+                shown = await run_in_threadpool(lambda: open_file(arrange(arrived, self.offered)))
+                self._drops.paths[shown.name] = arrived.folder / shown.name
+                self._dropped = self._kept(shown)
+        except Exception as error:  # whatever is wrong with the files
+            # Of what is refused no more is read.
+            return PlainTextResponse(" ".join(str(error).split()), 400, {"Connection": "close"})
+        return JSONResponse({"file": shown.name})
 
     async def mesh(self, request: Request) -> Response:
         """GET /mesh?id=ID."""
@@ -122,18 +172,10 @@ class Viewer:
             await asyncio.gather(running, return_exceptions=True)
 
     async def stop(self) -> None:
-        """Start no more computations."""
+        """Start no more computations, and keep nothing that was dropped."""
         for threads in (self._threads, self.files):
             threads.shutdown(wait=False, cancel_futures=True)
-
-
-def _opened(own: ShownScene, known: list[ShownScene], file: str, fresh: bool) -> ShownScene:
-    """The scene of ``file`` beside the server's ``own``: one of ``known`` that is up to date, or a new one."""
-    if own.path is None and not fresh:
-        return own
-    path = own.beside(file) if fresh or file in own.files else own.path
-    assert path is not None  # which mypy cannot tell
-    return _loaded(known, path) if fresh else _unedited(known, path)
+        self._drops.close()
 
 
 def _current(shown: ShownScene, known: list[ShownScene]) -> ShownScene:
@@ -200,6 +242,7 @@ def make_app(shown: ShownScene, host: str, port: int, token: str | None, ancesto
             Route("/scene", viewer.description),
             Route("/mesh", viewer.mesh),
             Route("/octree", viewer.boxes),
+            Route("/drop", viewer.drop, methods=["POST"]),
             WebSocketRoute("/ws", viewer.connect),
             Mount("/static", StaticFiles(directory=PAGE)),
         ],

@@ -16,6 +16,8 @@ from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]", "::1")
+# The methods of HTTP by which a page may ask for anything: it reads no answer of another origin.
+_READING = ("GET", "HEAD")
 
 
 def is_loopback(address: str) -> bool:
@@ -61,7 +63,8 @@ class ResponseHeaders:
 
 
 class SameOrigin:
-    """Refuse a WebSocket whose page did not come from here: 403 unless Origin names this Host.
+    """Refuse what changes something, a WebSocket or a POST, of a page that did not come from here: 403 unless Origin
+    names this Host.
 
     Programs send no Origin; they are let in where ``token_required``, because ``TokenRequired`` checks them.
     """
@@ -70,7 +73,7 @@ class SameOrigin:
         self.app, self.token_required = app, token_required
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] == "websocket":
+        if scope["type"] == "websocket" or (scope["type"] == "http" and scope["method"] not in _READING):
             headers = Headers(scope=scope)
             origin, host = headers.get("origin"), headers.get("host")
             # Neither names anything in "Origin: null" without a Host.

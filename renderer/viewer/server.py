@@ -55,13 +55,20 @@ class ViewerServer:
         logging.getLogger("uvicorn.error").addFilter(_no_mere_refusal)
         logging.getLogger("asyncio").addFilter(_no_lost_client)
         self._server = uvicorn.Server(config)
-        self._thread = threading.Thread(target=self._server.run, args=([listening],), name="viewer", daemon=True)
-        self._thread.start()
+        self._ended = threading.Event()
+        threading.Thread(target=self._run, args=(listening,), name="viewer", daemon=True).start()
+
+    def _run(self, listening: socket.socket) -> None:
+        try:
+            self._server.run([listening])
+        finally:
+            self._ended.set()
 
     def wait(self) -> None:
         """Return once the server has ended, as it does after ``close`` on another thread."""
-        while self._thread.is_alive():
-            self._thread.join(_PATIENCE)
+        # Not by Thread.join: where Ctrl-C interrupts it, Python 3.11 takes the thread for one that has ended.
+        while not self._ended.wait(_PATIENCE):
+            pass
 
     def close(self) -> None:
         """End the server; pages say that the connection is lost."""

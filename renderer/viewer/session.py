@@ -12,6 +12,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
 
+from renderer.errors import expect
 from renderer.scene.hide import is_side, object_names
 from renderer.viewer.commands import command_of, saved, scene_text
 from renderer.viewer.compare import Comparison
@@ -102,6 +103,9 @@ class SceneHost(Protocol):
     async def hide(self, shown: ShownScene, hidden: Collection[str]) -> ShownScene:
         """``shown`` without those of its objects. Raises ``ValueError``."""
 
+    def is_dropped(self, shown: ShownScene) -> bool:
+        """Whether its files came from a page, and go with the server."""
+
 
 @dataclass
 class Connection:
@@ -156,6 +160,8 @@ class Session:
             elif isinstance(message, SaveScene):
                 self.saves.put(message)
             elif isinstance(message, AskCommand):
+                dropped = self.host.is_dropped(self.shown)
+                expect(not dropped, "command", "a file of the renderer's machine", "one that was dropped on the page")
                 await self._tell(type="command", text=command_of(self.shown, message))
             elif isinstance(message, Still | Turntable):
                 self.exporter.begin(self.shown, message)

@@ -147,14 +147,23 @@ def test_a_foreign_pages_socket_is_refused(port: int, origin: str) -> None:
     assert opening(port, Origin=origin.format(port)) == 403
 
 
+@cases("origin", ["http://evil.example", "http://127.0.0.1:1", "null"])
+def test_a_foreign_page_drops_no_file(port: int, wide: ViewerServer, origin: str) -> None:
+    """Browsers let it send some, and only keep the answer from it."""
+    for host, path in ((port, "/drop"), (urlsplit(wide.url).port, f"/drop?{urlsplit(wide.url).query}")):
+        answer = asked(host, path, {"Origin": origin}, method="POST")
+        assert (answer.status, answer.body) == (403, f"Origin: expected 127.0.0.1:{host}, got {origin}")
+
+
 def test_a_program_without_origin_is_refused_where_there_is_no_token(port: int) -> None:
     assert opening(port) == 403
+    assert asked(port, "/drop", method="POST").status == 403
 
 
 @cases("path", PATHS)
 def test_answers_say_what_the_page_may_do(port: int, path: str) -> None:
     foreign = asked(port, path, {"Host": "evil.example", "Origin": "http://evil.example"})
-    posted = asked(port, path, method="POST")
+    posted = asked(port, path, {"Origin": f"http://127.0.0.1:{port}"}, method="POST")
     assert (foreign.status, posted.status) == (400, 404 if path == "/nowhere" else 405)
     for answer in (asked(port, path, {"Origin": "http://evil.example"}), foreign, posted):
         rules = dict(rule.split(" ", 1) for rule in answer.headers["Content-Security-Policy"].split("; "))
@@ -341,13 +350,14 @@ def test_two_servers_have_two_tokens_of_256_bits(shown: ShownScene, wide: Viewer
     assert tokens[0] != tokens[1]
 
 
-@cases("path", ["/", "/scene", "/mesh", "/octree", "/static/main.js", "/nowhere", "/ws"])
+@cases("path", ["/", "/scene", "/mesh", "/octree", "/drop", "/static/main.js", "/nowhere", "/ws"])
 @cases("query", ["", "?token=", "?token=wrong", "?token=%ff%00", "?Token={}", "?token={}x", "?token={}%20"])
 def test_without_the_token_nothing_is_served(wide: ViewerServer, path: str, query: str) -> None:
     url = urlsplit(wide.url)
     given = query.format(url.query.removeprefix("token="))
-    headers = {**HANDSHAKE, "Origin": f"http://127.0.0.1:{url.port}"} if path == "/ws" else {}
-    answer = asked(url.port, path + given, headers)
+    own = {"Origin": f"http://127.0.0.1:{url.port}"}
+    headers = {"/ws": HANDSHAKE | own, "/drop": own}.get(path, {})
+    answer = asked(url.port, path + given, headers, "POST" if path == "/drop" else "GET")
     assert answer.status == 403 and "Set-Cookie" not in answer.headers
     assert answer.body == "token: expected the one in the address that octree-render printed"
 
@@ -369,6 +379,8 @@ def test_with_the_token_a_foreign_page_is_refused_and_a_program_let_in(wide: Vie
     url = urlsplit(wide.url)
     path = f"/ws?{url.query}"
     assert opening(url.port, path) == 101
+    posted = asked(url.port, f"/drop?{url.query}", method="POST")
+    assert (posted.status, posted.body[:6]) == (400, "files:")
     assert opening(url.port, path, Origin=f"http://127.0.0.1:{url.port}") == 101
     assert opening(url.port, path, Host="any.example", Origin="http://any.example") == 101
     for origin in ("http://evil.example", "http://127.0.0.1:1", "null"):

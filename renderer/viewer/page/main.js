@@ -6,6 +6,7 @@ import { Busy } from "./busy.js";
 import { Changes } from "./changes.js";
 import { Connection } from "./connection.js";
 import { Controls } from "./controls.js";
+import { Drop } from "./drop.js";
 import { film } from "./film.js";
 import { Frames } from "./frames.js";
 import { GlLayer } from "./gl.js";
@@ -97,6 +98,7 @@ class Viewer {
     bindKeys(this);
     returnKeys(this.stage);
     this.bindButtons();
+    this.drop = new Drop(this, { button: find("#open-files"), input: find("#files"), target: find("#drop") });
     new ResizeObserver(() => this.layout()).observe(this.stage);
     document.body.dataset.ready = "true";
   }
