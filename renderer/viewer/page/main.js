@@ -13,6 +13,7 @@ import { drawing } from "./layers.js";
 import { continues, kept, remember, remembered, stays } from "./memory.js";
 import { Hint } from "./hint.js";
 import { Legend } from "./legend.js";
+import { Measure } from "./measure.js";
 import { DEPTH, FACES, LIT } from "./model.js";
 import { Notices } from "./notices.js";
 import { fetchBoxes } from "./nodes.js";
@@ -21,6 +22,7 @@ import { NO_BOXES } from "./overlay.js";
 import { Panel } from "./panel.js";
 import { Past } from "./past.js";
 import { Picture } from "./picture.js";
+import { Pointed } from "./pointed.js";
 import { Progress } from "./progress.js";
 import { Proof } from "./proof.js";
 import { Rays } from "./rays.js";
@@ -62,6 +64,8 @@ class Viewer {
     this.progress = new Progress(find("#progress"));
     this.busy = new Busy(find("#busy"));
     this.rays = new Rays(find("#card"), find("#frame"), () => this.request(), (pick) => this.seeAside(pick));
+    this.measure = new Measure(this, { button: find("#measure"), card: find("#measured"), label: find("#distance") });
+    this.pointed = new Pointed(this, find("#pointed"));
     this.readings = new Readings(find("#readings"), find("#hud"));
     this.panel = new Panel((name) => this.changed(name));
     this.objects = new Objects(find("#objects"), (hidden) => this.hide(hidden));
@@ -206,6 +210,7 @@ class Viewer {
     Object.assign(this, { shown: null, boxes: NO_BOXES, staleSince: null, meshOf: null });
     this.sent.clear();
     this.rays.close();
+    this.measure.forget();
     this.picture.clear();
     this.proof.forget();
     this.legend.show(null);
@@ -476,8 +481,10 @@ class Viewer {
     if (this.layer) {
       const view = live ? { ...this.shown.view, w: this.shown.w, h: this.shown.h } : this.view();
       const shading = live ? DEPTH : this.shading;
-      this.layer.draw(view, drawing(shading, this.boxes, this.rays));
+      this.layer.draw(view, drawing(shading, this.boxes, this.rays, this.measure));
     }
+    this.measure.place(live ? this.shown.view : this.view());
+    this.pointed.refresh();
     if (this.mode === "gl" && this.layer?.loaded) this.note({ seq: this.seq, step: 0, last: true }, this.view());
     // A picture of an earlier camera stands for a while only, unless another drawing has replaced it by then.
     this.standing = live && !current && Boolean(this.layer?.loaded);
@@ -543,6 +550,8 @@ class Viewer {
       // Not after a cancel, which this may have crossed on the way.
       progress: ({ seq, done }) => seq === this.seq && this.progress.shown && this.progress.show(done),
       pick: (pick) => this.picked(pick),
+      measure: (told) => this.measure.show(told),
+      probe: (told) => this.pointed.show(told),
       legend: (legend) => this.sent.has(legend.seq) && (this.sent.get(legend.seq).legend = legend),
       proof: (proof) => this.sent.has(proof.seq) && (this.sent.get(proof.seq).legend = proof),
       refined: (told) => told.seq === this.seq && this.refined(told),
@@ -569,6 +578,7 @@ class Viewer {
   refined(told) {
     if (this.shown?.seq === told.seq) this.shown.samples = told.samples;
     this.readings.refined(told);
+    this.pointed.refresh();
   }
 
   // The settings of the picture that is seen, which may have grown to more samples than are set.
@@ -616,7 +626,7 @@ class Viewer {
     // A card over the picture stands on the other side of it.
     const { left, width } = find("#frame").getBoundingClientRect();
     find("main").classList.toggle("aside-left", clientX > left + width / 2);
-    if (asked) this.connection.send(this.rays.ask(asked, this.panel.settings, this.proofOf(asked)));
+    if (asked && !this.measure.take(asked)) this.connection.send(this.rays.ask(asked, this.panel.settings, this.proofOf(asked)));
   }
 
   // Ask for the same pixel by the settings and the proof as they are now.
