@@ -172,6 +172,7 @@ def touch_viewing(prepared: PreparedScene) -> None:
     ray_path(prepared, eye, forward, 1)
     visited(prepared.octree, eye, forward)
     prepared.octree.count_steps(eye, forward)
+    prepared.octree.closest_hit(eye, forward, t_error=True)
 
 
 def compile_in_two() -> None:

@@ -191,6 +191,7 @@ class Viewer:
                 viewer.changed("boxes");
                 viewer.changed("walk");
                 viewer.rays.close();
+                viewer.measure.end();
                 viewer.changed("edits");
                 viewer.camera.reset();
                 viewer.layout();

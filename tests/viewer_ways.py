@@ -15,6 +15,7 @@ from renderer import PerspectiveCamera, Scene, load_scene, prepare, srgb
 from renderer.cli.main import main
 from renderer.diagnostics.face_phong import face_colors
 from renderer.diagnostics.ray_path import ray_path
+from renderer.numerics.vec3 import normalized
 from renderer.viewer.commands import command_of, saved, scene_text
 from renderer.viewer.compare import FEW, MANY, compared
 from renderer.viewer.export import still, turntable
@@ -130,9 +131,9 @@ def click(case: Case) -> tuple[Any, Any]:
     found, expected = [], []
     for x, y in ((3, 4), (5, 4), (6, 3), (0, 0)):
         found.append(picked(case.shown, case.message("pick", seq=1, x=x, y=y))["path"])
-        origin, direction = (row[0] + (x + 0.5) * row[1] + (y + 0.5) * row[2] for row in (rows[:3], rows[3:]))
-        path = ray_path(ready, origin, direction / np.linalg.norm(direction), settings.max_depth,
-                        min_weight=settings.min_weight, shadows=settings.shadows)  # fmt: skip
+        origin, direction = (row[0] + ((x + 0.5) * row[1] + (y + 0.5) * row[2]) for row in (rows[:3], rows[3:]))
+        path = ray_path(ready, origin, normalized(tuple(direction)), settings.max_depth, min_weight=settings.min_weight,
+                        shadows=settings.shadows)  # fmt: skip
         expected.append(list(map(asdict, path)))
     return found, expected
 

@@ -17,20 +17,22 @@ def camera_steps(
     camera: Camera,
     size: tuple[int, int],
     finished: Callable[[float], object] | None = None,
+    band: tuple[int, int] | None = None,
 ) -> Steps:
-    """The steps of the ray through each pixel's centre, (h, w) each, of a picture of ``size`` (w, h).
+    """The steps of the ray through each pixel's centre, (h, w) each, of a picture of ``size`` (w, h); of a ``band`` of
+    rows, first and end, only these.
 
     ``finished(share)`` is called with the share of the picture counted since the last call. An exception from it ends
     the counting.
     """
     width, height = size
     rows, steps = camera.rows(width, height), []
-    at_a_time = max(1, _RAYS // width)
+    at_a_time, (begin, end) = max(1, _RAYS // width), band or (0, height)
     x = (np.arange(width) + 0.5)[None, :, None]
-    for first in range(0, height, at_a_time):
-        y = (np.arange(first, min(first + at_a_time, height)) + 0.5)[:, None, None]
+    for first in range(begin, end, at_a_time):
+        y = (np.arange(first, min(first + at_a_time, end)) + 0.5)[:, None, None]
         origins, directions = (row + x * in_x + y * in_y for row, in_x, in_y in (rows[:3], rows[3:]))
         steps.append(prepared.octree.count_steps(origins, directions))
         if finished is not None:
-            finished(len(y) / height)
+            finished(len(y) / (end - begin))
     return Steps(*(np.concatenate([getattr(some, name) for some in steps]) for name in ("nodes", "triangles")))

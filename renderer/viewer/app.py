@@ -30,8 +30,9 @@ from renderer.viewer.watch import follow
 PAGE = Path(__file__).parent / "page"
 # Each connection may keep all processors busy; beyond this many, pictures would come too slowly for all.
 MAX_CONNECTIONS = 16
-# Threads per session: for its picture under way, the one before it whose last tiles end, a click, and a file to save.
-_THREADS_A_SESSION = 4
+# Threads per session: for its picture under way, the one before it whose last tiles end, a click,
+# a distance, the value under the pointer, and a file to save.
+_THREADS_A_SESSION = 6
 _TRY_LATER = 1013  # RFC 6455's registry of close codes
 
 

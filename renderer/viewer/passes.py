@@ -25,6 +25,7 @@ from renderer.viewer.protocol import (
     RGBA,
     CameraMessage,
     Mode,
+    Probe,
     Rows,
     packed,
 )
@@ -43,9 +44,9 @@ _LONGEST_REFERENCE = 256
 REFINED = (4, 16, 64)
 # The planes that an AOV is drawn from, beside radiance, and the counted rays that give the pace.
 _PLANES = {"color": (), "cost": (), "depth": ("depth", "face"), "normal": ("normal", "face"), "face": ("face",)}
-_STEPS = ("nodes", "triangles")
+STEPS = ("nodes", "triangles")
 # AOVs on a scale that goes from the least value of the whole picture to the greatest.
-_SCALED = ("depth", "cost", *_STEPS)
+_SCALED = ("depth", "cost", *STEPS)
 # On Pillow's scale; above it files grow faster than the quality that can be seen.
 _JPEG_QUALITY = 90
 # Of Pillow's nine: on this machine the page is as fast with larger files.
@@ -193,7 +194,7 @@ def colored(
 ) -> tuple[NDArray[np.uint8], Limits, float]:
     """The colours of a picture or a band, (h, w, 3), the ends of their scale if it has one, and rays per second."""
     aov = view.settings.aov
-    if aov in _STEPS:
+    if aov in STEPS:
         return _steps(shown, view, wanted, finished)
     image = picture(shown, view, wanted, finished)
     limits = limits_of(image, aov)
@@ -235,7 +236,10 @@ def _steps(
 
 
 def picture(
-    shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Callable[[float], object] = lambda share: None
+    shown: ShownScene,
+    view: CameraMessage | Probe,
+    wanted: Pass,
+    finished: Callable[[float], object] = lambda share: None,
 ) -> Image:
     """The picture that ``render`` gives for the view's camera and settings, or one band of it."""
     prepared = varied(shown.brute if view.mode == "brute" else shown.prepared, view.settings)

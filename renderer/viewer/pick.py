@@ -15,7 +15,7 @@ from renderer.shade.surface import surface_of
 from renderer.viewer.compare import Comparison
 from renderer.viewer.protocol import Pick
 from renderer.viewer.shown import ShownScene, varied
-from renderer.viewer.viewpoint import camera_of
+from renderer.viewer.viewpoint import ray_through
 
 # The most boxes sent for one ray, the first that it opens: more cover each other on the screen. ``visited`` counts all.
 _MAX_BOXES = 512
@@ -26,11 +26,7 @@ def picked(shown: ShownScene, pick: Pick, comparison: Comparison | None = None) 
     ``comparison`` also the values that the pixel has in it.
     """
     prepared = varied(shown.prepared, pick.settings)
-    rows = camera_of(pick.m, pick.fovy, height=pick.height).rows(pick.w, pick.h)
-    origin, direction = (
-        row + (pick.x + 0.5) * in_x + (pick.y + 0.5) * in_y for row, in_x, in_y in (rows[:3], rows[3:])
-    )
-    direction = direction / np.linalg.norm(direction)
+    origin, direction = ray_through(pick)
     x, y, z = direction.tolist()
     hits = prepared.octree.closest_hit(origin[None], direction[None])
 

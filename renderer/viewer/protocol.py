@@ -148,26 +148,48 @@ class Cancel(_Message):
     type: Literal["cancel"]
 
 
-class Pick(_Sized):
-    """A click on pixel (``x``, ``y``), counted from the top left, that asks for its ray and all that this spawns; and
-    for the pixel's values in the proof of view ``proof``.
-    """
+class Pixel(_Sized):
+    """Pixel (``x``, ``y``) of a view, counted from the top left."""
 
-    type: Literal["pick"]
-    seq: _Sequence
     x: Annotated[int, Field(ge=0, lt=MAX_SIDE)]
     y: Annotated[int, Field(ge=0, lt=MAX_SIDE)]
     m: _Matrix
     fovy: _Fovy
     height: _Height = None
-    proof: _Sequence | None = None
-    settings: ViewSettings = ViewSettings()
 
     @model_validator(mode="after")
     def _inside(self) -> Self:
         if not (self.x < self.w and self.y < self.h):
             raise ValueError(f"expected a pixel of a picture of {self.w} x {self.h}, got ({self.x}, {self.y})")
         return self
+
+
+class Pick(Pixel):
+    """A click on a pixel, that asks for its ray and all that this spawns; and for the pixel's values in the proof of
+    view ``proof``.
+    """
+
+    type: Literal["pick"]
+    seq: _Sequence
+    proof: _Sequence | None = None
+    settings: ViewSettings = ViewSettings()
+
+
+class Probe(Pixel):
+    """Send the value that this pixel of a traced picture shows."""
+
+    type: Literal["probe"]
+    seq: _Sequence
+    mode: Literal["brute", "octree"]
+    settings: ViewSettings = ViewSettings()
+
+
+class Measure(_Message):
+    """Send the surface points that one or two pixels see, and the distance of two; the pixels may be of two views."""
+
+    type: Literal["measure"]
+    seq: _Sequence
+    pixels: Annotated[list[Pixel], Field(min_length=1, max_length=2)]
 
 
 class Hello(_Message):
@@ -281,6 +303,8 @@ Message = (
     | Ack
     | Cancel
     | Pick
+    | Probe
+    | Measure
     | Hello
     | OpenScene
     | HideObjects

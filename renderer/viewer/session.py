@@ -18,8 +18,10 @@ from renderer.viewer.commands import command_of, saved, scene_text
 from renderer.viewer.compare import Comparison
 from renderer.viewer.export import Exporter
 from renderer.viewer.growth import Growth
+from renderer.viewer.measure import measured
 from renderer.viewer.passes import Answer, Pass, answer, passes_of
 from renderer.viewer.pick import picked
+from renderer.viewer.probe import probed
 from renderer.viewer.protocol import (
     SLOW,
     Ack,
@@ -28,8 +30,10 @@ from renderer.viewer.protocol import (
     Cancel,
     Hello,
     HideObjects,
+    Measure,
     OpenScene,
     Pick,
+    Probe,
     SaveCamera,
     SaveScene,
     Still,
@@ -119,7 +123,8 @@ class Connection:
 class Session:
     """One connection, which shows a scene of its own: at first the server's.
 
-    ``threads`` computes a picture, the one before it whose last tiles end, a click, and a scene file to save.
+    ``threads`` computes a picture, the one before it whose last tiles end, a click, a distance, the value
+    under the pointer, and a scene file to save.
     """
 
     host: SceneHost
@@ -127,6 +132,8 @@ class Session:
     threads: Executor
     views: Newest[CameraMessage] = field(default_factory=Newest)
     picks: Newest[Pick] = field(default_factory=Newest)
+    probes: Newest[Probe] = field(default_factory=Newest)
+    measures: Newest[Measure] = field(default_factory=Newest)
     saves: Newest[SaveScene] = field(default_factory=Newest)
     scenes: Newest[Hello | OpenScene | HideObjects | Reload] = field(default_factory=Newest)
 
@@ -155,6 +162,10 @@ class Session:
                 self.views.put(None)
             elif isinstance(message, Pick):
                 self.picks.put(message)
+            elif isinstance(message, Probe):
+                self.probes.put(message)
+            elif isinstance(message, Measure):
+                self.measures.put(message)
             elif isinstance(message, SaveCamera):
                 await self._tell(type="camera", name="camera.toml", text=saved(self.shown, message))
             elif isinstance(message, SaveScene):
@@ -176,7 +187,9 @@ class Session:
         """Show views, answer clicks, open scenes and make files until cancelled."""
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._show_views())
-            tasks.create_task(self._answer_picks())
+            tasks.create_task(self._answer(self.picks, self._picked))
+            tasks.create_task(self._answer(self.probes, probed))
+            tasks.create_task(self._answer(self.measures, measured))
             tasks.create_task(self._save_scenes())
             tasks.create_task(self._open_scenes())
             tasks.create_task(self.exporter.run(self.complain))
@@ -287,13 +300,12 @@ class Session:
             newer.cancel()
             wanted.cancel()
 
-    async def _answer_picks(self) -> None:
+    async def _answer(self, asked: Newest[T], answer: Callable[[ShownScene, T], dict[str, Any]]) -> None:
+        """Answer the newest question of a kind, one at a time."""
         while True:
-            pick = await self.picks.take()
+            question = await asked.take()
             try:
-                running = asyncio.get_running_loop().run_in_executor(
-                    self.threads, picked, self.shown, pick, self._proof_of(pick)
-                )
+                running = asyncio.get_running_loop().run_in_executor(self.threads, answer, self.shown, question)
                 await self._tell(**await running)
             except Exception as error:  # as above
                 await self.complain(error)
@@ -306,6 +318,9 @@ class Session:
                 await self._tell(type="saved", **(await running)._asdict())
             except Exception as error:  # as above
                 await self.complain(error)
+
+    def _picked(self, shown: ShownScene, pick: Pick) -> dict[str, Any]:
+        return picked(shown, pick, self._proof_of(pick))
 
     def _proof_of(self, pick: Pick) -> Comparison | None:
         """The comparison that the click is on."""

@@ -8,12 +8,14 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from pydantic import ValidationError
 
 from renderer.errors import SceneError, expect
+from renderer.numerics.vec3 import normalized
 from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
 from renderer.scene.fields import first_fault
+from renderer.viewer.protocol import Pixel
 
 # From so many times the scene's size and distance away, rays to one point are parallel to a millionth.
 _FAR = 1e6
@@ -39,6 +41,15 @@ def camera_of(m: Sequence[float], fovy: float, distance: float = 1.0, height: fl
         return kind.model_validate({**at, **film})
     except ValidationError as error:
         raise SceneError(f"{kind.__name__}: {first_fault(error)}") from None
+
+
+def ray_through(pixel: Pixel) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Origin and unit direction of the ray through a pixel's centre, with the bits that they have in a picture."""
+    rows = camera_of(pixel.m, pixel.fovy, height=pixel.height).rows(pixel.w, pixel.h)
+    x, y = pixel.x + 0.5, pixel.y + 0.5
+    # The sum in the order of the picture's kernel.
+    origin, direction = (row + (x * in_x + y * in_y) for row, in_x, in_y in (rows[:3], rows[3:]))
+    return origin, np.array(normalized(tuple(direction.tolist())))
 
 
 def seen_from(camera: Camera, bounds: ArrayLike) -> tuple[float, float, float]:

@@ -25,10 +25,11 @@ TURN: Table = {"pivot": [0.0, 0.4, 0.0], "axis": [0.0, 1.0, 0.0], "frames": 3, "
 OTHER_TURN: Table = {"pivot": [0.6, 0.1, 0.3], "axis": [0.2, 1.0, 0.3], "frames": 4, "format": "gif"}
 # By message: the keys beside those of a view and its settings that are varied here,
 HERE = {protocol.Pick: {"x", "y"}, protocol.Turntable: TURN.keys()}
-# and in tests/viewer/test_viewer_*.py: of server, commands, proof, edits and export.
+# and in tests/viewer/test_viewer_*.py: of server, commands, proof, edits, export, measure and probe.
 ELSEWHERE = {
     protocol.CameraMessage: {"mode"}, protocol.AskCommand: {"mode"}, protocol.Pick: {"proof"},
     protocol.SaveCamera: {"walk"}, protocol.Ack: {"step"}, protocol.HideObjects: {"hidden"},
+    protocol.Probe: {"x", "y", "mode"}, protocol.Measure: {"pixels"},
     protocol.OpenScene: {"file"}, protocol.Hello: {"file", "hidden", "server"},
 }  # fmt: skip
 

@@ -67,8 +67,10 @@ export class Frames {
     viewer.stage.classList.toggle("waiting", traced && !live);
     if (layer) {
       const view = live ? { ...shown.view, w: shown.w, h: shown.h } : viewer.view();
-      layer.draw(view, drawing(live ? DEPTH : this.shading, viewer.scenes.boxes, viewer.rays));
+      layer.draw(view, drawing(live ? DEPTH : this.shading, viewer.scenes.boxes, viewer.rays, viewer.measure));
     }
+    viewer.measure.place(live ? shown.view : viewer.view());
+    viewer.pointed.refresh();
     if (mode === "gl" && layer?.loaded) this.note({ seq: viewer.traced.seq, step: 0, last: true }, viewer.view());
     // A picture of an earlier camera stands for a while only, unless another drawing has replaced it by then.
     this.standing = live && !current && Boolean(layer?.loaded);

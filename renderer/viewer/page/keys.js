@@ -24,7 +24,8 @@ export function bindKeys(viewer) {
     x: () => viewer.mode === "proof" && viewer.proof.toggle(),
     ",": () => level(-1),
     ".": () => level(1),
-    Escape: () => (viewer.rays.shown ? viewer.rays.close() : viewer.cancel()),
+    m: () => viewer.measure.toggle(),
+    Escape: () => (viewer.measure.on ? viewer.measure.end() : viewer.rays.shown ? viewer.rays.close() : viewer.cancel()),
     Enter: () => viewer.picking.middle(),
   };
   MODES.forEach((mode, i) => (commands[i + 1] = () => viewer.setMode(mode)));

@@ -13,12 +13,14 @@ import { GlLayer } from "./gl.js";
 import { Hint } from "./hint.js";
 import { bindKeys, returnKeys } from "./keys.js";
 import { Legend } from "./legend.js";
+import { Measure } from "./measure.js";
 import { Notices } from "./notices.js";
 import { Objects } from "./objects.js";
 import { Panel } from "./panel.js";
 import { Past } from "./past.js";
 import { Picking } from "./picking.js";
 import { Picture } from "./picture.js";
+import { Pointed } from "./pointed.js";
 import { Progress } from "./progress.js";
 import { Proof } from "./proof.js";
 import { Readings } from "./readings.js";
@@ -52,6 +54,8 @@ class Viewer {
     this.notices = new Notices(find("#notices"));
     this.progress = new Progress(find("#progress"));
     this.busy = new Busy(find("#busy"));
+    this.measure = new Measure(this, { button: find("#measure"), card: find("#measured"), label: find("#distance") });
+    this.pointed = new Pointed(this, find("#pointed"));
     this.readings = new Readings(find("#readings"), find("#hud"));
     this.panel = new Panel((name) => this.changed(name));
     this.objects = new Objects(find("#objects"), (names) => this.scenes.hide([...names, ...this.section.hidden]));
@@ -251,6 +255,8 @@ class Viewer {
       // Not after a cancel, which this may have crossed on the way.
       progress: ({ seq, done }) => seq === traced.seq && this.progress.shown && this.progress.show(done),
       pick: (pick) => this.picking.picked(pick),
+      measure: (told) => this.measure.show(told),
+      probe: (told) => this.pointed.show(told),
       legend: (legend) => traced.explain(legend),
       proof: (proof) => traced.explain(proof),
       refined: (told) => traced.refined(told),

@@ -16,7 +16,7 @@ export class Picking {
     // A card over the picture stands on the other side of it.
     const { left, width } = this.frame.getBoundingClientRect();
     this.card.parentElement.classList.toggle("aside-left", clientX > left + width / 2);
-    if (asked) this.ask(asked);
+    if (asked && !this.viewer.measure.take(asked)) this.ask(asked);
   }
 
   middle() {

@@ -88,6 +88,7 @@ export class Scenes {
     Object.assign(this, { boxes: NO_BOXES, meshOf: null });
     viewer.traced.forget();
     viewer.rays.close();
+    viewer.measure.forget();
     viewer.picture.clear();
     viewer.proof.forget();
     viewer.legend.show(null);

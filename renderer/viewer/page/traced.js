@@ -158,6 +158,7 @@ export class Traced {
     if (seq !== this.seq) return;
     if (this.shown?.seq === seq) this.shown.samples = samples;
     this.viewer.readings.refined({ seq, samples, ...rest });
+    this.viewer.pointed.refresh();
   }
 
   // The number of the proof that says something of `view`, null where none does or there is no view.
