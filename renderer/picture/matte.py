@@ -1,0 +1,99 @@
+"""Pictures without their background: the share of each pixel that shows a surface, as the alpha of a PNG file."""
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.picture.encoding import write_pixels
+from renderer.picture.exposure import exposed
+from renderer.picture.image import srgb
+from renderer.picture.prepare import PreparedScene
+from renderer.scene.camera import Camera
+from renderer.scene.scene import RenderSettings
+from renderer.shade.records import AMBIENT, KIND, UNLIT
+from renderer.system.files import write_atomically
+from renderer.trace.spawn import BOUNDED
+
+
+@dataclass(frozen=True, eq=False)
+class Matte:
+    """What the camera rays of a picture hit.
+
+    hits        the number of a pixel's samples that hit a surface, (h, w) int64
+    samples     the number of samples of each pixel
+    background  the sum over the other samples of the radiance that they see, divided by ``samples``, (h, w, 3) float32
+    """
+
+    hits: NDArray[np.int64]
+    samples: int
+    background: NDArray[np.float32]
+
+    @property
+    def alpha(self) -> NDArray[np.uint8]:
+        """The share of hits in 255ths, rounded up, (h, w)."""
+        return (-(-255 * self.hits // self.samples)).astype(np.uint8)
+
+    def exposed(self, stops: float) -> "Matte":
+        """That of a picture with an exposure."""
+        return replace(self, background=exposed(self.background, stops))
+
+
+def matte_of(
+    prepared: PreparedScene,
+    camera: Camera,
+    chosen: RenderSettings,
+    threads: int,
+    finished: Callable[[int], object] | None = None,
+    band: tuple[int, int] | None = None,
+) -> Matte:
+    """The matte of the picture with these arguments; see ``PreparedScene.picture``.
+
+    Two pictures by the same rays tell it, without bounces: white surfaces before black, and black surfaces before the
+    background.
+    """
+    shapes = _without_light(prepared)
+    still = chosen.model_copy(update={"max_depth": 0})
+
+    def seen(shown: PreparedScene) -> NDArray[np.float32]:
+        return shown.picture(camera, still, BOUNDED, threads, finished, (), band).radiance
+
+    white = replace(shapes, arrays=shapes.arrays._replace(colors=np.array([[1.0] * 3, [0.0] * 3]), sky=np.zeros((0, 3))))
+    hits = np.rint(chosen.samples * seen(white)[..., 0].astype(np.float64)).astype(np.int64)
+    return Matte(hits, chosen.samples, seen(shapes))
+
+
+def _without_light(prepared: PreparedScene) -> PreparedScene:
+    """``prepared`` with opaque surfaces that show ambient light alone, of which there is none."""
+    arrays = prepared.arrays
+    materials = np.zeros_like(arrays.materials)
+    materials[:, KIND], materials[:, AMBIENT : AMBIENT + 3] = UNLIT, 1.0
+    colors = np.array([[0.0] * 3, arrays.colors[1]])
+    return replace(
+        prepared,
+        needs=replace(prepared.needs, reflection=False, refraction=False),
+        arrays=arrays._replace(materials=materials, colors=colors, media=arrays.media[:0], touching=arrays.touching[:0]),
+    )
+
+
+def cut_out(radiance: NDArray[np.float32], matte: Matte) -> NDArray[np.uint8]:
+    """The pixels of a transparent picture, (h, w, 4): sRGB that is not multiplied by alpha, and alpha.
+
+    Linear colours over the background, by alpha in 255ths, are ``radiance`` again. Alpha is rounded up, so that each
+    colour lies between that of the surface and of the background, and is one that sRGB has if both are.
+    """
+    alpha, misses = matte.alpha, matte.samples - matte.hits
+    share = (alpha / 255.0)[..., None]
+    behind = matte.background * (matte.samples / np.maximum(misses, 1))[..., None]
+    seen = alpha > 0
+    colors = (radiance - (1.0 - share) * behind)[seen] / share[seen]
+    pixels = np.zeros((*alpha.shape, 4), np.uint8)
+    pixels[seen] = np.column_stack([srgb(colors), alpha[seen]])
+    return pixels
+
+
+def save_cut_out(path: str | os.PathLike[str], radiance: NDArray[np.float32], matte: Matte) -> None:
+    """Write a transparent picture as a PNG file, whole or not at all."""
+    write_atomically(path, lambda file: write_pixels(file, cut_out(radiance, matte)))
