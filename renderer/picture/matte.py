@@ -54,28 +54,27 @@ def matte_of(
     Two pictures by the same rays tell it, without bounces: white surfaces before black, and black surfaces before the
     background.
     """
-    shapes = _without_light(prepared)
-    still = chosen.model_copy(update={"max_depth": 0})
+    shapes, colors, sky = _unlit(prepared), prepared.arrays.colors, prepared.arrays.sky
+    direct = chosen.model_copy(update={"max_depth": 0})
 
-    def seen(shown: PreparedScene) -> NDArray[np.float32]:
-        return shown.picture(camera, still, BOUNDED, threads, finished, (), band).radiance
+    def seen(ambient: float, background: NDArray[np.float64], sky: NDArray[np.float64]) -> NDArray[np.float32]:
+        arrays = shapes.arrays._replace(colors=np.array([[ambient] * 3, background]), sky=sky)
+        shown = replace(shapes, arrays=arrays)
+        return shown.picture(camera, direct, BOUNDED, threads, finished, (), band).radiance
 
-    white = replace(shapes, arrays=shapes.arrays._replace(colors=np.array([[1.0] * 3, [0.0] * 3]), sky=np.zeros((0, 3))))
-    hits = np.rint(chosen.samples * seen(white)[..., 0].astype(np.float64)).astype(np.int64)
-    return Matte(hits, chosen.samples, seen(shapes))
+    share = seen(1.0, np.zeros(3), sky[:0])[..., 0].astype(np.float64)
+    hits = np.rint(chosen.samples * share).astype(np.int64)
+    return Matte(hits, chosen.samples, seen(0.0, colors[1], sky))
 
 
-def _without_light(prepared: PreparedScene) -> PreparedScene:
-    """``prepared`` with opaque surfaces that show ambient light alone, of which there is none."""
+def _unlit(prepared: PreparedScene) -> PreparedScene:
+    """``prepared`` with opaque surfaces whose radiance is that of the ambient light."""
     arrays = prepared.arrays
     materials = np.zeros_like(arrays.materials)
     materials[:, KIND], materials[:, AMBIENT : AMBIENT + 3] = UNLIT, 1.0
-    colors = np.array([[0.0] * 3, arrays.colors[1]])
-    return replace(
-        prepared,
-        needs=replace(prepared.needs, reflection=False, refraction=False),
-        arrays=arrays._replace(materials=materials, colors=colors, media=arrays.media[:0], touching=arrays.touching[:0]),
-    )
+    needs = replace(prepared.needs, reflection=False, refraction=False)
+    alone = arrays._replace(materials=materials, media=arrays.media[:0], touching=arrays.touching[:0])
+    return replace(prepared, needs=needs, arrays=alone)
 
 
 def cut_out(radiance: NDArray[np.float32], matte: Matte) -> NDArray[np.uint8]:
