@@ -1,10 +1,12 @@
 """``octree-render render``: a scene file in, a picture out."""
 
 import argparse
+import math
 import os
 import sys
 import tempfile
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,8 @@ _CHANGE = (
     "replace the camera, the lights, materials, the ambient light, the background or sky, or keys of render, such as "
     "'render.shadows = false', or leave objects out, such as 'hide = [\"objects.0\", \"floor\"]'; may be given again"
 )
+_EXPOSURE = "make the picture 2^STOPS times as bright; default: 0"
+_TRANSPARENT = "for a .png: leave the background out, with alpha in its place"
 _ACCELERATOR = "default: auto, the octree unless there are very few faces; brute tests all faces"
 
 
@@ -33,6 +37,8 @@ def add_render(commands: Any) -> None:
     render.add_argument("--samples", type=int, metavar="N", help="samples per pixel: 1, 4, 9, ...")
     render.add_argument("--min-weight", type=float, metavar="W", help="end rays whose weight is less")
     render.add_argument("--max-rays", type=int, metavar="N", help="the most rays per sample of a pixel")
+    render.add_argument("--exposure", type=stops, default=0.0, metavar="STOPS", help=_EXPOSURE)
+    render.add_argument("--transparent", action="store_true", help=_TRANSPARENT)
     render.add_argument("--change", action="append", default=[], metavar="TOML", help=_CHANGE)
     render.add_argument("--accelerator", choices=("auto", "octree", "brute"), default="auto", help=_ACCELERATOR)
     render.add_argument("--split", choices=("midpoint", "sah"), default="midpoint", help=SPLIT)
@@ -51,21 +57,35 @@ def resolution(text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
+def stops(text: str) -> float:
+    """The number of stops of an exposure."""
+    from renderer.picture.exposure import MAX_STOPS
+
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not abs(value) <= MAX_STOPS:
+        raise argparse.ArgumentTypeError(f"expected a number from {-MAX_STOPS:g} to {MAX_STOPS:g}, got {text!r}")
+    return value
+
+
 def _render(options: argparse.Namespace) -> None:
     # Imported here so that --help and --version need no compiler.
     from renderer.picture.image import PLANES, check_picture_path
 
     check_picture_path(options.output)
+    _check_transparent(options)
     scene = _scene(options)
     names = ("resolution", "samples", "max_depth", "min_weight", "max_rays", "accelerator", "split")
     asked: dict[str, Any] = {name: getattr(options, name) for name in names}
     asked["planes"] = PLANES if options.output.suffix.lower() == ".exr" else ("rays",)
     if options.cluster is None:
-        image = _rendered_here(scene, asked, options)
-        _save(image, options.output)
+        image, matte = _rendered_here(scene, asked, options)
+        _save(_exposed(image, options), options.output, matte and matte.exposed(options.exposure))
     else:
         run, image = render_on_cluster(scene, asked, options)
-        image.save(options.output)
+        _exposed(image, options).save(options.output)
         # Only now, so that a file that cannot be written costs no picture.
         run.remove()
     if image.cut:
@@ -92,15 +112,44 @@ def _scene(options: argparse.Namespace) -> Any:
     return scene
 
 
-def _rendered_here(scene: Any, asked: dict[str, Any], options: argparse.Namespace) -> Any:
-    """The picture, rendered on this machine."""
+def _check_transparent(options: argparse.Namespace) -> None:
+    """Refuse a transparent picture where none is made."""
+    if options.transparent:
+        expect(options.output.suffix.lower() == ".png", "--transparent", "a .png file", repr(str(options.output)))
+        expect(options.cluster is None, "--transparent", "a picture of this machine", "--cluster")
+
+
+def _rendered_here(scene: Any, asked: dict[str, Any], options: argparse.Namespace) -> tuple[Any, Any]:
+    """The picture, rendered on this machine, and its matte if it is to be transparent."""
     from renderer.picture.image import CutWarning
-    from renderer.picture.render import render
+    from renderer.picture.render import prepare, render
     from renderer.precompile import compile_in_two
 
     compile_in_two()
     warnings.simplefilter("ignore", CutWarning)  # reported on one line
-    return render(scene, **asked, threads=options.threads, progress=not options.quiet)
+    source, asked = scene, {**asked, "threads": options.threads}
+    if options.transparent:
+        source = prepare(scene, **{name: asked.pop(name) for name in ("accelerator", "split")}, threads=options.threads)
+    image = render(source, **asked, progress=not options.quiet)
+    return image, _matte(source, options) if options.transparent else None
+
+
+def _matte(ready: Any, options: argparse.Namespace) -> Any:
+    """The matte of the picture of a prepared scene."""
+    from renderer.picture.matte import matte_of
+    from renderer.scene.scene import checked_settings
+    from renderer.system.threads import checked_threads
+
+    scene = ready.scene
+    chosen = checked_settings(scene.render, {name: getattr(options, name) for name in ("resolution", "samples")})
+    return matte_of(ready, scene.camera, chosen, checked_threads(options.threads))
+
+
+def _exposed(image: Any, options: argparse.Namespace) -> Any:
+    """The picture with the exposure of the options."""
+    from renderer.picture.exposure import exposed
+
+    return replace(image, radiance=exposed(image.radiance, options.exposure))
 
 
 def _summary(image: Any, options: argparse.Namespace) -> str:
@@ -126,17 +175,28 @@ def _check_output_is_no_input(options: argparse.Namespace, scene: Any) -> None:
     expect(apart, "--output", "another file than the scene's own", f"{output} by a link")
 
 
-def _save(image: Any, path: Path) -> None:
-    """Save a picture. If that fails, save it in a temporary folder and raise an error with its path."""
-    try:
+def _write(image: Any, path: Path, matte: Any) -> None:
+    from renderer.picture.matte import save_cut_out
+
+    if matte is None or path.suffix.lower() != ".png":
         image.save(path)
+    else:
+        save_cut_out(path, image.radiance, matte)
+
+
+def _save(image: Any, path: Path, matte: Any = None) -> None:
+    """Save a picture, transparent where it has a matte. If that fails, save it in a temporary folder and raise an error
+    with its path.
+    """
+    try:
+        _write(image, path, matte)
     except (OSError, MemoryError) as error:
         # Its radiance is written as it is, where there is no memory to encode it.
         name = path.name if isinstance(error, OSError) else f"{path.stem}.npy"
         folder = tempfile.mkdtemp(prefix="octree-render-")
         kept = Path(folder) / name
         try:
-            image.save(kept)
+            _write(image, kept, matte)
         except OSError:
             os.rmdir(folder)
             raise error from None

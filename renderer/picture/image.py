@@ -210,7 +210,8 @@ class Image:
         if suffix == ".npy":
             write_atomically(path, lambda file: write_array(file, self.radiance))
         elif suffix == ".exr":
-            write_exr(path, self.radiance, self._layers())
+            content = exr_of(self, Path(path).resolve().parent)
+            write_atomically(path, lambda file: file.write(content))
         else:
             write_atomically(path, self._write_png)
 
@@ -251,6 +252,11 @@ class Image:
         write_pixels(file, self.srgb)
 
 
+def exr_of(image: Image, beside: Path) -> bytes:
+    """The content of the .exr file of a picture; ``beside`` as of ``exr_bytes``."""
+    return exr_bytes(_channels(image.radiance, image._layers()), beside)
+
+
 def check_picture_path(path: str | os.PathLike[str]) -> None:
     """Raise ``ValueError`` or ``OSError`` unless ``save`` can write there; to be called before a long render."""
     path = as_path("path", path)
@@ -276,6 +282,9 @@ def write_exr(
 
     Whole or not at all. Raises ``ValueError`` where the package OpenEXR is absent.
     """
-    channels = {"RGB": np.ascontiguousarray(radiance, np.float32), **(layers or {})}
-    content = exr_bytes(channels, Path(path).resolve().parent)
+    content = exr_bytes(_channels(radiance, layers or {}), Path(path).resolve().parent)
     write_atomically(path, lambda file: file.write(content))
+
+
+def _channels(radiance: ArrayLike, layers: Mapping[str, NDArray[np.float32]]) -> dict[str, NDArray[np.float32]]:
+    return {"RGB": np.ascontiguousarray(radiance, np.float32), **layers}

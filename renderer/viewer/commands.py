@@ -74,6 +74,7 @@ def command_of(shown: ShownScene, asked: AskCommand) -> str:
     words += ["--resolution", f"{asked.w}x{asked.h}"]
     words += ["--samples", str(1 if brute else settings.samples), "--max-depth", str(settings.max_depth)]
     words += ["--accelerator", "brute"] if brute else []
+    words += [f"--exposure={settings.exposure!r}"] if settings.exposure else []
     words += [word for change in changes for word in ("--change", change)]
     return shlex.join([*words, "-o", _as_word(f"{path.stem if path else ''}.png")])
 

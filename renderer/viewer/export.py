@@ -7,6 +7,8 @@ import io
 import math
 from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import Executor
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,8 +16,11 @@ from numpy.typing import NDArray
 
 from renderer.errors import expect
 from renderer.picture.encoding import encoded
+from renderer.picture.exr import check_exr
+from renderer.picture.image import PLANES, exr_of
+from renderer.picture.matte import cut_out, matte_of
 from renderer.scene.camera import unit
-from renderer.viewer.passes import Pass, colored, passes_of
+from renderer.viewer.passes import Pass, colored, passes_of, picture, traced_by
 from renderer.viewer.protocol import FILE, CameraMessage, Rows, Still, Turntable, packed
 from renderer.viewer.shown import ShownScene
 from renderer.viewer.viewpoint import camera_of
@@ -36,11 +41,15 @@ class StoppedError(Exception):
 
 
 def still(shown: ShownScene, asked: Still, finished: Callable[[float], object]) -> bytes:
-    """The PNG file of the picture that ``render`` gives for the view's camera and settings.
+    """The file of the picture that ``render`` gives for the view's camera and settings.
 
-    ``finished(rays)`` is called with camera rays that are traced, of ``work(asked)`` in all; what it raises ends it.
+    ``finished(rays)`` is called with camera rays that are traced, of ``work(asked)`` in all, and with 0 while the
+    background is left out; what it raises ends it.
     """
-    return encoded(_pixels(shown, _view(asked, asked.m), finished))
+    view = _view(asked, asked.m)
+    if asked.format == "exr":
+        return _exr(shown, view, finished)
+    return encoded((_cut_out if asked.format == "transparent" else _pixels)(shown, view, finished))
 
 
 def turntable(shown: ShownScene, asked: Turntable, finished: Callable[[float], object]) -> bytes:
@@ -99,6 +108,8 @@ class Exporter:
         """Start a file. Raises ``ValueError`` while another is under way, and for a bad camera."""
         expect(not self._busy, asked.type, "one file at a time", "another one while one is made")
         camera_of(asked.m, asked.fovy, height=asked.height)
+        if isinstance(asked, Still) and asked.format != "png":
+            _expect_format(asked)
         self._busy, self._stopped = True, False
         self._asked.put_nowait((shown, asked))
 
@@ -153,6 +164,13 @@ class Exporter:
     def _expect_wanted(self) -> None:
         if self._stopped:
             raise StoppedError
+
+
+def _expect_format(asked: Still) -> None:
+    """Refuse a format that the picture cannot have, or that this machine cannot write."""
+    expect(asked.settings.aov == "color", asked.format, "the picture in colour", repr(asked.settings.aov))
+    if asked.format == "exr":
+        check_exr()
 
 
 def _heard(ended: "asyncio.Future[Any]") -> None:
@@ -219,6 +237,24 @@ def _pixels(shown: ShownScene, view: CameraMessage, finished: Callable[[float], 
         first, end = _rows(wanted)
         rgb[first:end], *_ = colored(shown, view, wanted, _in_rays(finished, wanted.work))
     return rgb
+
+
+def _cut_out(shown: ShownScene, view: CameraMessage, finished: Callable[[float], object]) -> NDArray[np.uint8]:
+    """The picture's colours without its background, (h, w, 4)."""
+    rgba = np.empty((view.h, view.w, 4), np.uint8)
+    for wanted in _full(view):
+        first, end = _rows(wanted)
+        image = picture(shown, view, wanted, _in_rays(finished, wanted.work))
+        matte = matte_of(*traced_by(shown, view, wanted), shown.threads, lambda _: finished(0), wanted.band)
+        rgba[first:end] = cut_out(image.radiance, matte.exposed(view.settings.exposure))
+    return rgba
+
+
+def _exr(shown: ShownScene, view: CameraMessage, finished: Callable[[float], object]) -> bytes:
+    """The picture with its depth and normals, as ``Image.save`` writes it."""
+    parts = [picture(shown, view, wanted, _in_rays(finished, wanted.work), PLANES) for wanted in _full(view)]
+    planes: Any = {name: np.concatenate([getattr(part, name) for part in parts]) for name in PLANES}
+    return exr_of(replace(parts[0], **planes), Path.cwd())
 
 
 def _in_rays(finished: Callable[[float], object], rays: int) -> Callable[[float], object]:

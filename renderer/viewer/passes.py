@@ -2,8 +2,8 @@
 
 import struct
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any, NamedTuple
 
@@ -14,8 +14,11 @@ from renderer.diagnostics.face_phong import face_colors
 from renderer.diagnostics.false_color import Limits, false_color, limits_of, limits_of_counts, scale_colors, shades_of
 from renderer.diagnostics.ray_cost import camera_steps
 from renderer.picture.encoding import encoded
+from renderer.picture.exposure import exposed
 from renderer.picture.image import Image, srgb
-from renderer.picture.prepare import TILE, tiles
+from renderer.picture.prepare import TILE, PreparedScene, tiles
+from renderer.scene.camera import Camera
+from renderer.scene.scene import RenderSettings
 from renderer.trace.spawn import BOUNDED
 from renderer.viewer.compare import Comparison, compared, heat_map
 from renderer.viewer.protocol import (
@@ -206,7 +209,8 @@ def _proven(shown: ShownScene, view: CameraMessage, wanted: Pass, finished: Call
     """Both pictures of a comparison, and their heat map."""
     comparison = compared(shown, view, wanted.size, finished)
     heat, limits = heat_map(comparison)
-    files = [encoded(rgb, compress_level=_PNG_EFFORT) for rgb in (*map(srgb, comparison.pictures), heat)]
+    colors = [srgb(exposed(picture, view.settings.exposure)) for picture in comparison.pictures]
+    files = [encoded(rgb, compress_level=_PNG_EFFORT) for rgb in (*colors, heat)]
     told = _legend("difference", limits) | comparison.described() | {"type": "proof"}
     payload = b"".join(chain(*((struct.pack("<I", len(file)), file) for file in files)))
     return _Payload(PROOF, payload, told=told, comparison=comparison)
@@ -240,18 +244,31 @@ def picture(
     view: CameraMessage | Probe,
     wanted: Pass,
     finished: Callable[[float], object] = lambda share: None,
+    planes: Collection[str] | None = None,
 ) -> Image:
-    """The picture that ``render`` gives for the view's camera and settings, or one band of it."""
+    """The picture that ``render`` gives for the view's camera and settings, or one band of it, with the ``planes`` that
+    are asked for, by default those that it is drawn from. In colour it has the view's exposure.
+    """
+    prepared, camera, settings = traced_by(shown, view, wanted)
+    planes = ("rays", *_PLANES[view.settings.aov]) if planes is None else planes
+    first, end = wanted.band or (0, wanted.size[1])
+    number = tiles(wanted.size[0], end - first)
+    image = prepared.picture(
+        camera, settings, BOUNDED, shown.threads, lambda done: finished(done / number), planes, wanted.band
+    )
+    if view.settings.aov != "color":
+        return image
+    return replace(image, radiance=exposed(image.radiance, view.settings.exposure))
+
+
+def traced_by(
+    shown: ShownScene, view: CameraMessage | Probe, wanted: Pass
+) -> tuple[PreparedScene, Camera, RenderSettings]:
+    """What ``render`` is given for the view's camera and settings."""
     prepared = varied(shown.brute if view.mode == "brute" else shown.prepared, view.settings)
     full = wanted.last or wanted.band is not None
     settings = render_settings(shown.scene, view.settings, wanted.size, wanted.samples, full)
-    camera = camera_of(view.m, view.fovy, height=view.height)
-    planes = ("rays", *_PLANES[view.settings.aov])
-    first, end = wanted.band or (0, wanted.size[1])
-    number = tiles(wanted.size[0], end - first)
-    return prepared.picture(
-        camera, settings, BOUNDED, shown.threads, lambda done: finished(done / number), planes, wanted.band
-    )
+    return prepared, camera_of(view.m, view.fovy, height=view.height), settings
 
 
 def _scaled(side: int, longest: int, of: int) -> int:

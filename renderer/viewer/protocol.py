@@ -22,6 +22,8 @@ MAX_SAMPLES = 64
 # Below a thousandth of a radian neighbouring rays differ by less than a page's float32 matrices resolve; above 3.1
 # almost all of the picture is its rim.
 MIN_FOVY, MAX_FOVY = 0.001, 3.1
+# Stops of either sign: from a thirtieth to thirty times as bright.
+MAX_EXPOSURE = 5.0
 
 # A turn in steps of a degree; and the pixels of all its frames together, those of 72 of 4096 x 720, the most that the
 # page offers, and some more: a GIF is a byte a pixel while it is encoded, 270 MB.
@@ -89,10 +91,10 @@ class Edits(_Message):
 
 class ViewSettings(_Message):
     """The settings of the panel. ``light`` is the direction in which the first directional light travels, null for the
-    scene's own; ``aov`` the value that a pixel shows; ``pixels`` the format in which pictures are sent; ``pair`` what a
-    proof compares: the octree and "brute" force, few and many "samples", or the octree and the reference of that name;
-    ``refine`` the samples per pixel up to which the picture of a camera at rest grows; ``edits`` what of the scene
-    differs from the file.
+    scene's own; ``aov`` the value that a pixel shows; ``exposure`` the stops by which colours are brighter than in the
+    scene; ``pixels`` the format in which pictures are sent; ``pair`` what a proof compares: the octree and "brute"
+    force, few and many "samples", or the octree and the reference of that name; ``refine`` the samples per pixel up to
+    which the picture of a camera at rest grows; ``edits`` what of the scene differs from the file.
     """
 
     max_depth: Annotated[int, Field(ge=0, le=64)] = 6
@@ -103,6 +105,7 @@ class ViewSettings(_Message):
     refine: Annotated[int, Field(ge=1, le=MAX_SAMPLES)] = 1
     aov: Literal["color", "depth", "normal", "face", "cost", "nodes", "triangles"] = "color"
     light: FiniteVector | None = None
+    exposure: Annotated[float, Field(ge=-MAX_EXPOSURE, le=MAX_EXPOSURE)] = 0.0
     pixels: Literal["rgba", "jpeg"] = "rgba"
     pair: Annotated[str, Field(min_length=1, max_length=40)] = "samples"
     edits: Edits = Edits()
@@ -253,7 +256,9 @@ class AskCommand(_Sized):
 
 
 class Still(_Sized):
-    """Make a PNG file of this view, traced by the octree, beside the view that is shown."""
+    """Make a picture's file of this view, traced by the octree, beside the view that is shown: PNG, PNG with a
+    "transparent" background, or EXR.
+    """
 
     type: Literal["still"]
     seq: _Sequence
@@ -261,6 +266,7 @@ class Still(_Sized):
     fovy: _Fovy
     height: _Height = None
     settings: ViewSettings = ViewSettings()
+    format: Literal["png", "transparent", "exr"] = "png"
 
 
 class Turntable(_Sized):

@@ -29,7 +29,7 @@ HERE = {protocol.Pick: {"x", "y"}, protocol.Turntable: TURN.keys()}
 ELSEWHERE = {
     protocol.CameraMessage: {"mode"}, protocol.AskCommand: {"mode"}, protocol.Pick: {"proof"},
     protocol.SaveCamera: {"walk"}, protocol.Ack: {"step"}, protocol.HideObjects: {"hidden"},
-    protocol.Probe: {"x", "y", "mode"}, protocol.Measure: {"pixels"},
+    protocol.Probe: {"x", "y", "mode"}, protocol.Measure: {"pixels"}, protocol.Still: {"format"},
     protocol.OpenScene: {"file"}, protocol.Hello: {"file", "hidden", "server"},
 }  # fmt: skip
 

@@ -12,6 +12,7 @@ import pytest
 import tomlkit
 from cases import cases
 from varied import BASE, VARIATIONS, Table, Variation, picture, scene_of
+from viewer_client import decoded
 from viewer_ways import (
     INSIDE,
     WAYS,
@@ -92,7 +93,7 @@ SETTINGS: dict[str, tuple[Table, Callable[[Table], None]]] = {
     ),
 }
 # Settings of some ways alone, each with a test of its own below.
-OWN = {"refine", "aov", "pair"}
+OWN = {"refine", "aov", "pair", "exposure"}
 # tests/viewer/test_viewer_server.py: a JPEG file looks like the picture.
 ELSEWHERE = {"pixels"}
 # Those that no file of a scene has, nor a command's.
@@ -233,6 +234,36 @@ def test_a_value_is_drawn_in_its_colours(shown: ShownScene, aov: Any) -> None:
         expected = false_color(case.picture(**plain), aov)
     for way in (octree, a_still, a_turntable):
         assert np.array_equal(way(case)[0], expected)
+
+
+@cases("way", [octree, brute, a_still, a_turntable, command])
+def test_colours_are_exposed_and_nothing_else(shown: ShownScene, way: Any) -> None:
+    case = Case(shown, page_of(shown.scene) | {"exposure": 1.5}, shown.scene).seen()
+    samples = {"samples": 1} if way is brute else {}
+    expected = srgb(case.picture(**samples).radiance * np.float32(2.0**1.5))
+    assert np.array_equal(way(case)[0], expected)
+    if way is not command:
+        plain, exposed = (replace(case, settings=case.settings | {"aov": "depth", "exposure": s}) for s in (0.0, 5.0))
+        assert np.array_equal(way(plain)[0], way(exposed)[0])
+
+
+def test_both_pictures_of_a_proof_are_exposed_and_their_difference_is_not(shown: ShownScene) -> None:
+    case = Case(shown, page_of(shown.scene), shown.scene).seen()
+    plain, exposed = (replace(case, settings={"exposure": s}).answer("proof") for s in (0.0, -2.0))
+    found = list(map(decoded, files(exposed)))
+    compared = [case.picture(samples=n, max_depth=6).radiance for n in (compare.FEW, compare.MANY)]
+    assert all(np.array_equal(one, srgb(radiance / 4)) for one, radiance in zip(found, compared, strict=False))
+    assert np.array_equal(found[2], decoded(files(plain)[2]))
+
+
+def files(payload: bytes) -> list[bytes]:
+    """The three files of a proof."""
+    found = []
+    while payload:
+        size = int.from_bytes(payload[:4], "little")
+        found.append(payload[4 : 4 + size])
+        payload = payload[4 + size :]
+    return found
 
 
 @cases("name", SETTINGS)

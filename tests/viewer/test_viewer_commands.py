@@ -26,6 +26,7 @@ EYE = (0.3, 2.0, 4.0)
     ("changes", "settings"),
     [
         ({"height": 3.0}, {"samples": 4, "max_depth": 1, "shadows": False}),
+        ({}, {"exposure": -1.3}),
         ({"mode": "brute", "w": 40, "h": 30}, {"samples": 4}),
         ({}, {"light": [1.0, -1.0, 0.5], "edits": {"lights": [{"type": "directional", "direction": [0, -1, 0]}]}}),
     ],

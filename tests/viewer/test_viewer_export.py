@@ -3,6 +3,8 @@
 import io
 import json
 import math
+import shlex
+import sys
 import threading
 import weakref
 from collections.abc import Iterator
@@ -13,14 +15,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cases import cases
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image as Pillow
 from viewer_client import HEAVY, Client, Got, decoded, frames, looking, rendered
 
 from renderer import load_scene
+from renderer.cli.main import main
 from renderer.picture.image import srgb
 from renderer.viewer import export, passes
+from renderer.viewer.commands import command_of
 from renderer.viewer.protocol import FILE, Still, parse
 from renderer.viewer.shown import ShownScene, open_file
 
@@ -75,6 +80,42 @@ def test_a_still_is_the_file_that_the_renderer_saves(
     rendered(load_scene(scene), **settings).save(tmp_path / "expected.png")
     file = received(client, still(settings=settings))
     assert file == (tmp_path / "expected.png").read_bytes()
+
+
+@cases("bands", [False, True])
+@cases("kind", ["transparent", "exr"])
+def test_a_still_of_another_format_is_the_file_of_the_command(
+    shown: ShownScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bands: bool, kind: str
+) -> None:
+    """The bits of an EXR file are not compared, but its layers are: it may hold a date."""
+    if bands:
+        monkeypatch.setattr(passes, "BAND_PIXELS", 10_000)
+    settings = {"samples": 4, "exposure": -0.7}
+    asked = read(still(settings=settings, format=kind))
+    command = {"type": "command", "mode": "octree", **looking(EYE), "w": asked.w, "h": asked.h, "settings": settings}
+    words = shlex.split(command_of(shown, read(command)))
+    done: list[float] = []
+    file = export.still(shown, asked, done.append)
+    assert sum(done) == pytest.approx(export.work(asked))
+    found, expected = (tmp_path / f"{name}.{'exr' if kind == 'exr' else 'png'}" for name in ("found", "expected"))
+    found.write_bytes(file)
+    assert main([*words[1:-1], str(expected), "--quiet", *(["--transparent"] if kind == "transparent" else [])]) == 0
+    if kind == "transparent":
+        assert file == expected.read_bytes()
+        return
+    openexr = pytest.importorskip("OpenEXR")
+    one, other = (openexr.File(str(path)).channels() for path in (found, expected))
+    assert one.keys() == other.keys()
+    assert all(np.array_equal(one[name].pixels, other[name].pixels) for name in one)
+
+
+def test_a_still_that_this_machine_cannot_write_is_refused_before_it_is_traced(
+    client: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "OpenEXR", None)
+    client.send(**still(format="exr"))
+    assert "expected the package OpenEXR" in client.told("error")["message"]
+    assert decoded(received(client, still(seq=2, w=8, h=8))).shape == (8, 8, 3)
 
 
 def test_a_view_is_answered_while_a_still_is_made(client: Any, scene: Path) -> None:

@@ -1,7 +1,7 @@
 // Files that the server makes for this page: asked for one at a time, and received in pieces.
 import { FILE } from "./connection.js";
 
-const TYPES = { png: "image/png", webp: "image/webp", gif: "image/gif" };
+const TYPES = { png: "image/png", webp: "image/webp", gif: "image/gif", exr: "image/x-exr" };
 
 export class Exports {
   // `send(message)` asks the server. `shown(done)` is called with the share that is made, null when nothing is being made

@@ -1,4 +1,5 @@
 // What is drawn, in the page's next frame: the traced picture, or WebGL's model, and what lies over both.
+import { gain } from "./exposure.js";
 import { drawing } from "./layers.js";
 import { DEPTH, FACES, LIT } from "./model.js";
 import { REST, SLOW, STALE, TRACED } from "./traced.js";
@@ -67,6 +68,7 @@ export class Frames {
     viewer.stage.classList.toggle("waiting", traced && !live);
     if (layer) {
       const view = live ? { ...shown.view, w: shown.w, h: shown.h } : viewer.view();
+      layer.gain = gain(viewer.panel.fields.exposure.valueAsNumber);
       layer.draw(view, drawing(live ? DEPTH : this.shading, viewer.scenes.boxes, viewer.rays, viewer.measure));
     }
     viewer.measure.place(live ? shown.view : viewer.view());

@@ -1,6 +1,6 @@
 // The WebGL layer: the model and lines over it, or lines alone over a traced picture.
 import { clipMatrix, dot, norm, scale, add, seenFrom, sub } from "./matrix.js";
-import { DEPTH, Model } from "./model.js";
+import { DEPTH, LIT, Model } from "./model.js";
 import { Boxes } from "./boxes.js";
 import { Lines } from "./lines.js";
 
@@ -29,6 +29,7 @@ export class GlLayer {
     this.model = new Model(this.gl);
     this.boxes = new Boxes(this.gl);
     this.lines = new Lines(this.gl);
+    this.gain = 1; // of the colours of the lit model and its sky
     const info = this.gl.getExtension("WEBGL_debug_renderer_info");
     const name = this.gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : this.gl.RENDERER);
     this.mostBoxes = SOFTWARE.test(name) ? BOXES.software : BOXES.hardware;
@@ -70,7 +71,8 @@ export class GlLayer {
     const seen = layers.filter(({ set }) => set.count);
     gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
     const dark = NIGHT.map((c) => c * veil);
-    const sky = this.scene.background.map((c, i) => srgb(c) * (1 - veil) + dark[i]);
+    const gain = shading === LIT ? this.gain : 1;
+    const sky = this.scene.background.map((c, i) => srgb(c * gain) * (1 - veil) + dark[i]);
     gl.clearColor(...(shading === DEPTH ? [...dark, veil] : [...sky, 1]));
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LESS);
@@ -78,7 +80,7 @@ export class GlLayer {
     if (shading === DEPTH && !seen.length) return;
     const clip = clipMatrix(view, this.scene.bounds);
     const eye = seenFrom(view, this.scene.bounds);
-    this.model.draw(shading, clip, { eye, scene: this.scene, veil: [...dark, veil] });
+    this.model.draw(shading, clip, { eye, scene: this.scene, veil: [...dark, veil], gain });
     this.boxes.draw(panes, clip);
     for (const { name, set, hidden, fades } of seen) this.lines.draw(name, set, clip, this.fade(view, fades), hidden);
   }

@@ -73,6 +73,7 @@ flat in uint material;
 uniform sampler2D materials;
 uniform vec3 ambient;
 uniform vec3 background;
+uniform float gain;
 uniform int light_count;
 uniform vec4 light_places[${MAX_LIGHTS}]; // w 0: towards the light; w 1: its position
 uniform vec3 light_colors[${MAX_LIGHTS}];
@@ -103,7 +104,7 @@ vec3 lit(vec3 n, vec3 v) {
     float highlight = cosine > 0.0 ? pow(max(dot(2.0 * cosine * n - l, v), 1e-6), shininess) : 0.0;
     sum += (kd * cosine + ks * highlight) * arriving;
   }
-  return srgb(sum);
+  return srgb(gain * sum);
 }
 #endif
 
@@ -202,7 +203,7 @@ export class Model {
     this.coloured = true;
   }
 
-  // Draw by `clip` (world to clip space); `appearance` is {eye, scene, veil}.
+  // Draw by `clip` (world to clip space); `appearance` is {eye, scene, veil, gain}.
   draw(shading, clip, appearance) {
     const { gl } = this;
     const seen = shading === FACES && !this.coloured ? LIT : shading;
@@ -221,7 +222,7 @@ export class Model {
     gl.disable(gl.POLYGON_OFFSET_FILL);
   }
 
-  drawRuns(runs, shading, glass, clip, { eye, scene, veil }) {
+  drawRuns(runs, shading, glass, clip, { eye, scene, veil, gain }) {
     if (!runs.length) return;
     const { gl } = this;
     this.programs[[shading, glass]] ??= program(gl, source(shading, glass, VERTEX), source(shading, glass, FRAGMENT));
@@ -231,6 +232,7 @@ export class Model {
     gl.uniform4fv(uniforms.veil, veil);
     if (uniforms.eye) gl.uniform3fv(uniforms.eye, eye);
     if (shading === LIT) this.setLights(uniforms, scene);
+    if (shading === LIT) gl.uniform1f(uniforms.gain, gain);
     for (const [first, count] of runs) gl.drawArrays(gl.TRIANGLES, 3 * first, 3 * count);
   }
 

@@ -1,6 +1,7 @@
 // The panel: its form holds the settings, the rest shows what the scene is and how fast its pictures come.
 import { Edits } from "./edits.js";
 import { element } from "./element.js";
+import { told as stops } from "./exposure.js";
 import { Folds } from "./folds.js";
 import { lowered, raised } from "./matrix.js";
 import { levelColor } from "./overlay.js";
@@ -10,7 +11,7 @@ import { count } from "./readings.js";
 const MAX_SAMPLES = 64;
 const DEGREE = Math.PI / 180;
 // What the user chooses of a scene's picture, beside its camera, materials and lights.
-const CHOICES = ["size", "aov", "samples", "refine", "max_depth", "shadows", "reflection", "refraction", "pair"];
+const CHOICES = ["size", "aov", "samples", "refine", "max_depth", "shadows", "reflection", "refraction", "pair", "exposure"];
 // Those that are the page's and no scene's: they stay when a scene is loaded.
 const STAYING = ["size", "aov", "refine", "pair"];
 
@@ -48,6 +49,7 @@ export class Panel {
     this.offerSamples(scene.render.samples);
     fields.shadows.checked = scene.render.shadows;
     fields.reflection.checked = fields.refraction.checked = true;
+    fields.exposure.value = 0;
     fields.level.max = Math.max(scene.octree.levels - 1, 0);
     // Some hundred boxes at most: enough to see, few enough to see through.
     fields.level.value = Math.min(3, fields.level.max);
@@ -131,12 +133,12 @@ export class Panel {
 
   // The settings of a view as the server reads them.
   get settings() {
-    const { max_depth, samples, shadows, reflection, refraction, aov, refine, pair } = this.fields;
+    const { max_depth, samples, shadows, reflection, refraction, aov, refine, pair, exposure } = this.fields;
     // Raw pixels cost nothing on this machine; through a network a tenth of them is worth the loss.
     const local = ["localhost", "127.0.0.1", "[::1]"].includes(location.hostname);
     const edits = this.edits.value;
     return { ...(edits ? { edits } : {}), max_depth: Number(max_depth.value), samples: Number(samples.value), shadows: shadows.checked,
-      reflection: reflection.checked, refraction: refraction.checked, aov: aov.value, refine: Number(refine.value), pair: pair.value, pixels: local ? "rgba" : "jpeg" };
+      reflection: reflection.checked, refraction: refraction.checked, aov: aov.value, refine: Number(refine.value), pair: pair.value, exposure: Number(exposure.value), pixels: local ? "rgba" : "jpeg" };
   }
 
   // The fields of the camera as it is.
@@ -173,6 +175,7 @@ export class Panel {
     document.querySelector("#show-boxes").disabled = fields.boxes.disabled;
     fields.max_depth_shown.value = fields.max_depth.value;
     fields.level_shown.value = fields.level.value;
+    fields.exposure_shown.value = stops(fields.exposure.valueAsNumber);
     document.querySelectorAll("#levels i").forEach((bar, i) => bar.classList.toggle("chosen", i === Number(fields.level.value)));
     fields.azimuth_shown.value = `${Math.round(fields.azimuth.value)}°`;
     fields.elevation_shown.value = `${Math.round(fields.elevation.value)}°`;
@@ -212,6 +215,7 @@ export class Panel {
     const traced = mode === "octree" || mode === "brute" || mode === "proof";
     document.querySelector("#traced").disabled = !traced;
     this.fields.samples.disabled = this.fields.refine.disabled = mode !== "octree"; // others have their own numbers
+    this.fields.exposure.disabled = mode === "phong"; // whose colours come as they are
     this.fields.aov.disabled = !traced || mode === "proof"; // which compares colours
     document.querySelector("#traced-note").hidden = traced;
   }

@@ -35,6 +35,7 @@ export class Share {
       view: { m: view.m, fovy: view.fovy, height: view.height, w: canvas.width, h: canvas.height },
       camera: viewer.camera.state,
       mode,
+      gain: viewer.layer?.gain ?? 1,
       boxes: { level: boxes.level, levels: boxes.levels, all: boxes.all },
       pick: viewer.rays.shown ? viewer.rays.pick : null,
       note: this.lacks(scene),

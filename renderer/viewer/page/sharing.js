@@ -12,6 +12,7 @@ const LOOK = 100;
 // Sizes of a still: of its own, or as many times the view's.
 const SIZES = [["3840x2160", "3840 × 2160"], ["2560x1440", "2560 × 1440"], ["1920x1080", "1920 × 1080"],
   ["2048x2048", "2048 × 2048"], ["2", "view × 2"], ["4", "view × 4"]];
+const STILLS = [["png", "PNG"], ["transparent", "PNG, transparent background"], ["exr", "EXR"]];
 // Pixels from top to bottom of a turntable, which has the view's shape, and its frames.
 const HEIGHTS = [["240", "240 high"], ["360", "360 high"], ["480", "480 high"], ["720", "720 high"]];
 const FRAMES = [["24", "24 frames"], ["36", "36 frames"], ["72", "72 frames"]];
@@ -43,6 +44,7 @@ export class Sharing {
     this.still = button("export-still", "Save picture", "Rendered in this size while the view stays", () => this.askStill());
     this.turntable = button("export-turntable", "Save turntable", "Once around what the camera turns about", () => this.askTurntable());
     this.size = select("still-size", "Size of the picture", SIZES, "3840x2160");
+    this.stillFormat = select("still-format", "Format of the picture", STILLS, "png");
     this.height = select("turntable-height", "Size of the turntable", HEIGHTS, "480");
     this.frames = select("turntable-frames", "Frames of the turntable", FRAMES, "36");
     this.format = select("turntable-format", "Format of the turntable", FORMATS, "webp");
@@ -51,7 +53,7 @@ export class Sharing {
       button("stop-export", "Cancel", "", () => this.exports.stop()));
     this.progress = new Progress(bar);
     section.append(element("summary", {}, element("h2", { textContent: "Share" })), this.file,
-      element("div", { className: "row" }, this.size, this.still),
+      element("div", { className: "choices stills" }, this.size, this.stillFormat), this.still,
       element("div", { className: "choices" }, this.height, this.frames, this.format), this.turntable, bar);
   }
 
@@ -86,7 +88,9 @@ export class Sharing {
     // As many as the view has once it rests.
     const samples = settings.aov === "color" ? Math.max(settings.samples, settings.refine) : settings.samples;
     this.note = samples > 1 ? `${samples} samples a pixel.` : "One sample a pixel.";
-    this.ask({ type: "still", ...this.asked, settings: { ...settings, samples }, ...size }, `-${size.w}x${size.h}.png`);
+    const { value: format } = this.stillFormat;
+    this.ask({ type: "still", ...this.asked, settings: { ...settings, samples }, ...size, format },
+      `-${size.w}x${size.h}.${format === "exr" ? "exr" : "png"}`);
   }
 
   askTurntable() {

@@ -32,6 +32,7 @@ class Standalone {
   loadLayer() {
     this.layer = new GlLayer(find("#gl"), () => this.withoutGl("the browser took it away"));
     this.layer.begin(this.known.scene);
+    this.layer.gain = this.known.gain;
     const mesh = bytesOf("#mesh");
     if (mesh.length) this.layer.load(mesh.buffer);
     this.boxes = levelBoxes(new Float32Array(bytesOf("#corners").buffer), this.known.boxes, this.layer.mostBoxes);
