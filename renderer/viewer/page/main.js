@@ -135,7 +135,7 @@ class Viewer {
     onClick("#reset-view", () => this.reset());
     onClick("#fit", () => this.fit());
     find("#sides").addEventListener("click", ({ target: { dataset: { side } } }) => side && this.look(this.camera.sides[side]));
-    onClick("#cancel", () => this.cancel());
+    onClick("#cancel", () => (this.progress.shown ? this.cancel() : this.setMode(this.mode)));
     onClick("#reload", () => scenes.open(this.scene.name));
     onClick("#reset-light", () => panel.edits.turnSun(panel.edits.sunlight));
     onClick("#save-picture", () => this.saving.save());
@@ -174,7 +174,7 @@ class Viewer {
   setMode(mode) {
     const input = find(`[name=mode][value=${mode}]`);
     if (input.disabled) return this.notices.say(`${input.parentElement.textContent.slice(1)}: ${input.parentElement.title}`);
-    if (SLOW.includes(this.mode) && mode !== this.mode) this.progress.show(null);
+    if (mode !== this.mode || !SLOW.includes(mode)) this.progress.show(null);
     find("#proof").hidden = mode !== "proof";
     if (mode !== "proof") this.proof.forget();
     if (!TRACED.includes(mode)) {
@@ -278,9 +278,8 @@ class Viewer {
     this.traced.cancel();
     this.saving.stop();
     this.busy.end("tracing");
-    this.progress.show(null);
+    this.progress.stop();
     this.frames.request();
-    this.notices.say("Cancelled; the next movement starts it again.");
   }
 }
 

@@ -10,9 +10,9 @@ import { count } from "./readings.js";
 const MAX_SAMPLES = 64;
 const DEGREE = Math.PI / 180;
 // What the user chooses of a scene's picture, beside its camera, materials and lights.
-const CHOICES = ["size", "aov", "samples", "refine", "max_depth", "shadows", "reflection", "refraction", "pair"];
+const CHOICES = ["size", "aov", "samples", "refine", "max_depth", "shadows", "reflection", "refraction", "pair", "faces"];
 // Those that are the page's and no scene's: they stay when a scene is loaded.
-const STAYING = ["size", "aov", "refine", "pair"];
+const STAYING = ["size", "aov", "refine", "pair", "faces"];
 
 const usual = (list) => ([...list.options].find((option) => option.defaultSelected) ?? list.options[0]).value;
 
@@ -211,6 +211,8 @@ export class Panel {
     document.querySelector("#traced").disabled = !traced;
     this.fields.samples.disabled = this.fields.refine.disabled = mode !== "octree"; // others have their own numbers
     this.fields.aov.disabled = !traced || mode === "proof"; // which compares colours
+    this.fields.aov.hidden = mode === "gl";
+    this.fields.faces.hidden = mode !== "gl";
     document.querySelector("#traced-note").hidden = traced;
   }
 }
