@@ -12,12 +12,13 @@ from renderer.diagnostics.tree_boxes import boxes_at, levels
 from renderer.errors import expect
 from renderer.mesh.mesh import face_normals
 from renderer.picture.prepare import PreparedScene
-from renderer.scene.hide import FLOOR, is_side, object_names
+from renderer.scene.hide import is_side
 from renderer.scene.light import DirectionalLight, Light
 from renderer.scene.material import Material, material_row
 from renderer.scene.needs import examine
 from renderer.shade.records import DIFFUSE, MATERIAL_COLUMNS, REFLECTANCE, SHININESS, SPECULAR, TRANSMITTANCE
 from renderer.shade.surface import SceneArrays
+from renderer.viewer.parts import parts_of
 from renderer.viewer.protocol import MODES
 from renderer.viewer.references import references
 from renderer.viewer.shown import ShownScene
@@ -130,18 +131,16 @@ def _material(name: str, material: Material) -> dict[str, Any]:
 
 def _objects(shown: ShownScene) -> list[dict[str, Any]]:
     """All objects of the scene, hidden ones too."""
-    scene = shown.whole.scene
-    names, count = object_names(scene), len(scene.objects)
-    parts = [scene.instances[i : i + 1] for i in range(count)] + [scene.instances[count:]]
     return [
         {
-            "name": name,
-            "label": FLOOR if name == FLOOR else part[0].mesh.name or name,
-            "materials": sorted({instance.material for instance in part}),
-            "faces": sum(len(instance.mesh.faces) for instance in part),
-            "shown": name not in shown.hidden,
+            "name": part.name,
+            "label": part.label,
+            "materials": sorted({instance.material for instance in part.instances}),
+            "faces": part.faces,
+            "bounds": part.bounds,
+            "shown": part.name not in shown.hidden,
         }
-        for name, part in zip(names, parts, strict=False)
+        for part in parts_of(shown.whole.scene)
     ]
 
 

@@ -13,6 +13,7 @@ from renderer.results.hits import Hits
 from renderer.shade.records import MATERIAL_COLUMNS
 from renderer.shade.surface import surface_of
 from renderer.viewer.compare import Comparison
+from renderer.viewer.parts import part_of_face
 from renderer.viewer.protocol import Pick
 from renderer.viewer.shown import ShownScene, varied
 from renderer.viewer.viewpoint import ray_through
@@ -65,7 +66,7 @@ def _values(comparison: Comparison, pick: Pick) -> dict[str, Any]:
 
 def _met(shown: ShownScene, prepared: PreparedScene, direction: Vector, hits: Hits) -> dict[str, Any]:
     if not hits.hit[0]:
-        return {"hit": False, "t": None, "face": None, "material": None, "point": None, "normal": None}
+        return {"hit": False} | dict.fromkeys(("t", "face", "object", "material", "point", "normal"))
     face = int(hits.face[0])
     material = list(shown.scene.materials)[int(prepared.arrays.material[face]) // MATERIAL_COLUMNS]
     surface = surface_of(prepared.arrays, face, float(hits.u[0]), float(hits.v[0]), direction)
@@ -73,6 +74,7 @@ def _met(shown: ShownScene, prepared: PreparedScene, direction: Vector, hits: Hi
         "hit": True,
         "t": float(hits.t[0]),
         "face": face,
+        "object": part_of_face(shown, face).name,
         "material": material,
         "point": hits.points[0].tolist(),
         "normal": surface.n_s,

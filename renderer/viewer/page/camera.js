@@ -84,9 +84,9 @@ export class Camera {
     this.fovy = Math.min(Math.max(2 * Math.atan(HALF_FILM / millimetres), NARROWEST), WIDEST);
   }
 
-  // The whole scene in view, seen from the side where the camera is.
-  fit(aspect) {
-    const [lower, upper] = this.scene.bounds;
+  // All that is within `bounds` in view, seen from the side where the camera is.
+  fit(aspect, bounds = this.scene.bounds) {
+    const [lower, upper] = bounds;
     this.pivot = scale(add(lower, upper), 0.5);
     const [right, up, back] = this.frame();
     const slope = Math.tan(this.fovy / 2) / ROOM;

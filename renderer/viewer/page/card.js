@@ -9,12 +9,12 @@ const NAMES = { camera: "camera ray", reflected: "reflected", refracted: "refrac
 const vector = (v) => v.map((x) => x.toFixed(3)).join("  ");
 const rgb = (color) => `rgb(${color.map((x) => Math.round(255 * Math.min(x, 1) ** (1 / 2.2))).join(" ")})`;
 
-function rows(pick, scene) {
+function rows(pick, scene, object) {
   if (!pick.hit) return [["hit", "nothing: the background"]];
   const material = scene.materials.find((m) => m.name === pick.material);
   const shown = { phong: "diffuse", mirror: "reflectance", dielectric: "transmittance" }[material?.type];
   const name = material ? [swatch(rgb(material[shown])), `${material.name} · ${material.type}`] : [String(pick.material)];
-  return [["material", ...name], ["face", String(pick.face)], ["t", pick.t.toPrecision(6)],
+  return [...(object ? [["object", object.label]] : []), ["material", ...name], ["face", String(pick.face)], ["t", pick.t.toPrecision(6)],
     ["point", vector(pick.point)], ["normal", vector(pick.normal)]];
 }
 
@@ -56,10 +56,11 @@ function byLevel(levels) {
 }
 
 // Fill and show `card`; `close()` is called by its button, `toggle(shown)` by the switch of the visited nodes,
-// `chosen(index)` for the ray that is pointed at, and `aside()`, where there is one, to see it from the side.
-export function showCard(card, pick, { scene, close, toggle, chosen, aside, shown }) {
+// `chosen(index)` for the ray that is pointed at, and `aside()`, where there is one, to see it from the side. `object`
+// has the label and the buttons of the object that was met, if there are any.
+export function showCard(card, pick, { scene, object, close, toggle, chosen, aside, shown }) {
   const list = element("dl");
-  for (const [name, ...value] of rows(pick, scene)) list.append(element("dt", { textContent: name }), element("dd", {}, ...value));
+  for (const [name, ...value] of rows(pick, scene, object)) list.append(element("dt", { textContent: name }), element("dd", {}, ...value));
   const closing = element("button", { type: "button", className: "close", ariaLabel: "Close", textContent: "×" });
   closing.addEventListener("click", close);
   const nodes = element("input", { type: "checkbox", checked: shown });
@@ -71,7 +72,11 @@ export function showCard(card, pick, { scene, close, toggle, chosen, aside, show
   side.addEventListener("click", () => aside());
   const title = element("h2", { textContent: pick.hit ? "Ray" : "Ray into the open" });
   const proof = pick.proof ? values(pick.proof) : [];
-  card.replaceChildren(closing, ...proof, title, list, element("ul", { className: "legend" }, ...legend(pick.path)),
-    ...rayTree(pick.path, chosen), visited, ...(pick.levels.length ? [byLevel(pick.levels)] : []), tested, ...(aside ? [side] : []));
+  const acts = object ? [element("div", { className: "buttons" }, ...object.buttons)] : [];
+  const rays = [element("ul", { className: "legend" }, ...legend(pick.path)), ...rayTree(pick.path, chosen)];
+  const nodesByLevel = pick.levels.length ? [byLevel(pick.levels)] : [];
+  // Of a ray into the open there is little to say.
+  const parts = pick.hit ? [...acts, ...rays, visited, ...nodesByLevel, tested, ...(aside ? [side] : [])] : [visited];
+  card.replaceChildren(closing, ...proof, title, list, ...parts);
   card.hidden = false;
 }

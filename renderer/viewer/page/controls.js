@@ -30,7 +30,7 @@ const HELD = {
 export const isForStage = (event, stage) => event.target === stage || event.target === document.body;
 
 // Letters, digits and signs mean it on every control that makes nothing of them; lists search by them.
-const MAKES_NOTHING_OF_THEM = "button, summary, input:is([type=checkbox], [type=radio], [type=range])";
+const MAKES_NOTHING_OF_THEM = "button, summary, [role=slider], input:is([type=checkbox], [type=radio], [type=range])";
 export const isShortcut = (event) =>
   event.key.length === 1 && event.key !== " " && event.target.matches(MAKES_NOTHING_OF_THEM);
 

@@ -98,6 +98,11 @@ export class Edits {
     return this.scene.materials.map(({ name }) => [name, this.now.materials[name]]);
   }
 
+  // The entry of a material in the list.
+  entryOf(name) {
+    return [...this.lists.materials.children].find((entry) => entry.dataset.name === name);
+  }
+
   // The scene with all this, as WebGL draws it.
   get dressed() {
     const materials = this.named.map(([name, fields]) => ({ name, diffuse: BLACK, specular: BLACK,

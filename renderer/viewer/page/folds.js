@@ -3,6 +3,8 @@
 const KEY = "octree-render-folds";
 // On windows less wide than this the picture has the room, until the panel is opened.
 const NARROW = "(max-width: 1099px)";
+// Milliseconds for which an entry that was looked for stands out.
+const FOUND = 2500;
 // The parts that are open at the first visit.
 const FIRST = ["fold-scene", "fold-readings"];
 
@@ -42,6 +44,15 @@ export class Folds {
     } catch {
       // Then the page begins folded.
     }
+  }
+
+  // Open the panel and the parts around an entry, and let it stand out for a moment.
+  reveal(entry) {
+    if (document.body.classList.contains("wide")) this.toggle.click();
+    for (let part = entry; part; part = part.parentElement.closest("details")) part.open = true;
+    entry.scrollIntoView({ block: "start" });
+    entry.classList.add("found");
+    setTimeout(() => entry.classList.remove("found"), FOUND);
   }
 
   // What a folded part says of itself, beside its title.

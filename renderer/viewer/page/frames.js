@@ -1,7 +1,7 @@
 // What is drawn, in the page's next frame: the traced picture, or WebGL's model, and what lies over both.
 import { gain } from "./exposure.js";
 import { drawing } from "./layers.js";
-import { DEPTH, FACES, LIT } from "./model.js";
+import { DEPTH, FACES, FLAT, LIT, WIREFRAME } from "./model.js";
 import { REST, SLOW, STALE, TRACED } from "./traced.js";
 
 // So long what was drawn last stays while its successor is on its way: drawing the model in between, only to draw again
@@ -51,7 +51,9 @@ export class Frames {
 
   // How the model is drawn where no traced picture is seen.
   get shading() {
-    return this.viewer.mode === "phong" ? FACES : LIT;
+    const { mode, panel } = this.viewer;
+    if (mode === "gl") return { smooth: LIT, flat: FLAT, wireframe: WIREFRAME }[panel.fields.faces.value];
+    return mode === "phong" ? FACES : LIT;
   }
 
   draw() {

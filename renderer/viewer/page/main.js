@@ -58,7 +58,7 @@ class Viewer {
     this.pointed = new Pointed(this, find("#pointed"));
     this.readings = new Readings(find("#readings"), find("#hud"));
     this.panel = new Panel((name) => this.changed(name));
-    this.objects = new Objects(find("#objects"), (names) => this.scenes.hide([...names, ...this.section.hidden]));
+    this.objects = new Objects(find("#objects"), (names) => this.scenes.hideObjects(names));
     this.section = new Section(find("#section"), () => this.scenes.hide([...this.objects.hidden, ...this.section.chosen]));
     this.changes = new Changes(find("#changes"));
     this.hint = new Hint(find("#hint"));
@@ -151,7 +151,7 @@ class Viewer {
     onClick("#fit", () => this.fit());
     find("#sides").addEventListener("click", ({ target: { dataset: { side } } }) => side && this.look(this.camera.sides[side]));
     onClick("#keep-view", () => this.bookmarks.add());
-    onClick("#cancel", () => this.cancel());
+    onClick("#cancel", () => (this.progress.shown ? this.cancel() : this.setMode(this.mode)));
     onClick("#reload", () => scenes.open(this.scene.name));
     onClick("#reset-light", () => panel.edits.turnSun(panel.edits.sunlight));
     onClick("#save-picture", () => this.saving.save());
@@ -190,7 +190,7 @@ class Viewer {
   setMode(mode) {
     const input = find(`[name=mode][value=${mode}]`);
     if (input.disabled) return this.notices.say(`${input.parentElement.textContent.slice(1)}: ${input.parentElement.title}`);
-    if (SLOW.includes(this.mode) && mode !== this.mode) this.progress.show(null);
+    if (mode !== this.mode || !SLOW.includes(mode)) this.progress.show(null);
     find("#proof").hidden = mode !== "proof";
     if (mode !== "proof") this.proof.forget();
     if (!TRACED.includes(mode)) {
@@ -298,9 +298,8 @@ class Viewer {
     this.traced.cancel();
     this.saving.stop();
     this.busy.end("tracing");
-    this.progress.show(null);
+    this.progress.stop();
     this.frames.request();
-    this.notices.say("Cancelled; the next movement starts it again.");
   }
 }
 

@@ -10,16 +10,27 @@ const KINDS = { phong: 0, mirror: 1, dielectric: 2 };
 // Attributes of a corner. What belongs to a face, WebGL takes from the face's last corner.
 const [POSITION, NORMAL, MATERIAL, COLOR] = [0, 1, 2, 3];
 const LAST = 2;
+// The positions of the two corners before a corner: of the last one, all that its face's normal takes.
+const [BEFORE, FIRST] = [4, 5];
+// Bytes of a position.
+const POINT = 12;
 
 export const LIT = 0;
 export const FACES = 1;
 export const DEPTH = 2;
+export const FLAT = 3;
+export const WIREFRAME = 4;
+
+const LIGHTED = [LIT, FLAT, WIREFRAME];
 
 // Each shading of what is opaque and of glass is a program of its own, so that none moves values it does not look at:
 // software GL, and whoever has only that, spends its time on the values of corners.
 const source = (shading, glass, text) => `#version 300 es
 #define LIT ${LIT}
 #define FACES ${FACES}
+#define FLAT ${FLAT}
+#define WIREFRAME ${WIREFRAME}
+#define LIGHTED ${Number(LIGHTED.includes(shading))}
 #define SHADING ${shading}
 #define GLASS ${Number(glass)}
 precision highp float;
@@ -29,12 +40,19 @@ ${text}`;
 const VERTEX = `
 layout(location = ${POSITION}) in vec3 position;
 uniform mat4 clip;
-#if SHADING == LIT || GLASS
+#if LIGHTED || GLASS
 layout(location = ${NORMAL}) in vec3 normal;
 out vec3 point;
 out vec3 shading_normal;
 #endif
-#if SHADING == LIT
+#if SHADING == FLAT
+layout(location = ${BEFORE}) in vec3 before;
+layout(location = ${FIRST}) in vec3 first;
+flat out vec3 face_normal;
+#elif SHADING == WIREFRAME
+out vec3 corner;
+#endif
+#if LIGHTED
 layout(location = ${MATERIAL}) in uint material_of_face;
 flat out uint material;
 #elif SHADING == FACES
@@ -43,11 +61,16 @@ flat out vec3 face_color;
 #endif
 
 void main() {
-#if SHADING == LIT || GLASS
+#if LIGHTED || GLASS
   point = position;
   shading_normal = normal;
 #endif
-#if SHADING == LIT
+#if SHADING == FLAT
+  face_normal = cross(normalize(before - first), normalize(position - first));
+#elif SHADING == WIREFRAME
+  corner = vec3(equal(ivec3(gl_VertexID % 3), ivec3(0, 1, 2)));
+#endif
+#if LIGHTED
   material = material_of_face;
 #elif SHADING == FACES
   face_color = color_of_face;
@@ -61,14 +84,27 @@ const FRAGMENT = `
 uniform vec4 veil; // premultiplied
 out vec4 color;
 
-#if SHADING == LIT || GLASS
+#if LIGHTED || GLASS
 in vec3 point;
 in vec3 shading_normal;
 uniform vec3 eye;
 #endif
+#if SHADING == FLAT
+flat in vec3 face_normal;
+#elif SHADING == WIREFRAME
+in vec3 corner; // barycentric
+
+// How much of the pixel an edge covers. Where faces are but a few pixels high, their edges fade, or they would hide all.
+float edge() {
+  vec3 slope = fwidth(corner);
+  vec3 pixels = corner / slope;
+  float height = 1.0 / min(slope.x, min(slope.y, slope.z));
+  return (1.0 - smoothstep(0.3, 1.3, min(pixels.x, min(pixels.y, pixels.z)))) * clamp(height / 8.0, 0.25, 1.0);
+}
+#endif
 #if SHADING == FACES
 flat in vec3 face_color;
-#elif SHADING == LIT
+#elif LIGHTED
 flat in uint material;
 uniform sampler2D materials;
 uniform vec3 ambient;
@@ -109,18 +145,29 @@ vec3 lit(vec3 n, vec3 v) {
 #endif
 
 void main() {
-#if SHADING == LIT || GLASS
+#if LIGHTED || GLASS
   vec3 v = normalize(eye - point);
+#if SHADING == FLAT
+  vec3 n = normalize(face_normal);
+#else
   vec3 n = normalize(shading_normal);
+#endif
   n = dot(n, v) < 0.0 ? -n : n;
 #endif
 #if GLASS
   float alpha = 0.28 + 0.6 * pow(1.0 - dot(n, v), 3.0);
 #else
-  const float alpha = 1.0;
+  float alpha = 1.0;
 #endif
-#if SHADING == LIT
-  color = vec4((lit(n, v) * (1.0 - veil.a) + veil.rgb) * alpha, alpha);
+#if LIGHTED
+  vec3 seen = lit(n, v);
+#if SHADING == WIREFRAME
+  // Dark on what is bright, bright on what is dark.
+  float line = edge(), bright = smoothstep(0.25, 0.5, dot(seen, vec3(0.2126, 0.7152, 0.0722)));
+  seen = mix(seen, mix(vec3(0.85), vec3(0.04), bright), 0.85 * line);
+  alpha = mix(alpha, 1.0, line);
+#endif
+  color = vec4((seen * (1.0 - veil.a) + veil.rgb) * alpha, alpha);
 #elif SHADING == FACES
   color = vec4((face_color * (1.0 - veil.a) + veil.rgb) * alpha, alpha);
 #else
@@ -152,10 +199,9 @@ export class Model {
     this.coloured = false;
     this.colors = new Uint8Array(12 * faces);
     gl.bindVertexArray(this.vertices);
-    for (const location of [POSITION, NORMAL]) {
-      this.fill(location, new Float32Array(buffer, 8 + 36 * faces * location, 9 * faces), gl.STATIC_DRAW);
-      gl.vertexAttribPointer(location, 3, gl.FLOAT, false, 0, 0);
-    }
+    this.fill(NORMAL, new Float32Array(buffer, 8 + 36 * faces, 9 * faces), gl.STATIC_DRAW);
+    gl.vertexAttribPointer(NORMAL, 3, gl.FLOAT, false, 0, 0);
+    this.fillPositions(new Float32Array(buffer, 8, 9 * faces));
     const materials = new Uint16Array(buffer, 8 + 72 * faces, faces);
     const ofCorners = new Uint16Array(3 * faces);
     for (let face = 0; face < faces; face++) ofCorners[3 * face + LAST] = materials[face];
@@ -182,6 +228,17 @@ export class Model {
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers[location]);
     gl.bufferData(gl.ARRAY_BUFFER, values, usage);
     gl.enableVertexAttribArray(location);
+  }
+
+  // Behind two that are nowhere, so that the corners before the first are in the buffer, too.
+  fillPositions(values) {
+    const { gl } = this;
+    this.fill(POSITION, 2 * POINT + values.byteLength, gl.STATIC_DRAW);
+    gl.bufferSubData(gl.ARRAY_BUFFER, 2 * POINT, values);
+    for (const [location, offset] of [[POSITION, 2], [BEFORE, 1], [FIRST, 0]]) {
+      gl.enableVertexAttribArray(location);
+      gl.vertexAttribPointer(location, 3, gl.FLOAT, false, 0, offset * POINT);
+    }
   }
 
   setMaterials(materials) {
@@ -231,8 +288,10 @@ export class Model {
     gl.uniformMatrix4fv(uniforms.clip, false, clip);
     gl.uniform4fv(uniforms.veil, veil);
     if (uniforms.eye) gl.uniform3fv(uniforms.eye, eye);
-    if (shading === LIT) this.setLights(uniforms, scene);
-    if (shading === LIT) gl.uniform1f(uniforms.gain, gain);
+    if (LIGHTED.includes(shading)) {
+      this.setLights(uniforms, scene);
+      gl.uniform1f(uniforms.gain, gain);
+    }
     for (const [first, count] of runs) gl.drawArrays(gl.TRIANGLES, 3 * first, 3 * count);
   }
 

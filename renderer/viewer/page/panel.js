@@ -11,9 +11,9 @@ import { count } from "./readings.js";
 const MAX_SAMPLES = 64;
 const DEGREE = Math.PI / 180;
 // What the user chooses of a scene's picture, beside its camera, materials and lights.
-const CHOICES = ["size", "aov", "samples", "refine", "max_depth", "shadows", "reflection", "refraction", "pair", "exposure"];
+const CHOICES = ["size", "aov", "samples", "refine", "max_depth", "shadows", "reflection", "refraction", "pair", "exposure", "faces"];
 // Those that are the page's and no scene's: they stay when a scene is loaded.
-const STAYING = ["size", "aov", "refine", "pair"];
+const STAYING = ["size", "aov", "refine", "pair", "faces"];
 
 const usual = (list) => ([...list.options].find((option) => option.defaultSelected) ?? list.options[0]).value;
 
@@ -217,6 +217,8 @@ export class Panel {
     this.fields.samples.disabled = this.fields.refine.disabled = mode !== "octree"; // others have their own numbers
     this.fields.exposure.disabled = mode === "phong"; // whose colours come as they are
     this.fields.aov.disabled = !traced || mode === "proof"; // which compares colours
+    this.fields.aov.hidden = mode === "gl";
+    this.fields.faces.hidden = mode !== "gl";
     document.querySelector("#traced-note").hidden = traced;
   }
 }

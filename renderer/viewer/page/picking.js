@@ -1,10 +1,12 @@
 // What a click on the picture does: its pixel's ray is asked for, looked at from the side, or turned about.
+import { ObjectCard } from "./objectcard.js";
 import { Rays } from "./rays.js";
 
 export class Picking {
   constructor(viewer, card, frame) {
     Object.assign(this, { viewer, card, frame, focusing: null });
     this.rays = new Rays(card, frame, () => viewer.frames.request(), (pick) => this.seeAside(pick));
+    this.object = new ObjectCard(viewer);
   }
 
   get asked() {
@@ -37,7 +39,7 @@ export class Picking {
   picked(pick) {
     if (pick.seq !== this.rays.seq) return;
     this.viewer.hint.learnt();
-    this.rays.show(pick, this.viewer.dressed);
+    this.rays.show(pick, this.viewer.dressed, this.object.part(pick));
     if (this.focusing === pick.seq) this.focusOn(pick);
   }
 
@@ -51,7 +53,8 @@ export class Picking {
   get free() {
     const [frame, card] = [this.frame, this.card].map((one) => one.getBoundingClientRect());
     const [left, right] = [Math.max(card.left, frame.left), Math.min(card.right, frame.right)];
-    const over = card.top < frame.bottom && card.bottom > frame.top ? Math.max(right - left, 0) : 0;
+    const above = getComputedStyle(this.card).position === "absolute"; // on phones it goes below the picture
+    const over = above && card.top < frame.bottom && card.bottom > frame.top ? Math.max(right - left, 0) : 0;
     const hidden = over && over + Math.min(left - frame.left, frame.right - right); // with the gap at its side
     const side = left - frame.left < frame.right - right ? 1 : -1;
     return { x: (side * hidden) / 2 / frame.height, width: (frame.width - hidden) / frame.height };
@@ -67,6 +70,7 @@ export class Picking {
 
   focusOn({ hit, point }) {
     this.focusing = null;
+    this.rays.close(); // which the first click opened
     if (!hit) return;
     this.viewer.camera.focus(point);
     this.viewer.moved();

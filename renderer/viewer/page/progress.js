@@ -12,6 +12,7 @@ export class Progress {
   // `done` from 0 to 1; null hides the bar.
   show(done) {
     this.bar.hidden = done === null;
+    this.mark(false);
     const now = performance.now();
     if (!done) this.began = now;
     this.bar.querySelector("progress").value = done ?? 0;
@@ -25,7 +26,19 @@ export class Progress {
     return seconds < 1.5 ? "" : ` · ${seconds < 90 ? `${Math.round(seconds)} s` : `${Math.round(seconds / 60)} min`} left`;
   }
 
+  // Say that it was cancelled; the button starts it again.
+  stop() {
+    this.mark(true);
+    this.bar.querySelector("output").value = "Cancelled";
+  }
+
+  mark(stopped) {
+    this.bar.classList.toggle("stopped", stopped);
+    this.bar.querySelector("button").textContent = stopped ? "Start" : "Cancel";
+  }
+
+  // Whether a picture is under way.
   get shown() {
-    return !this.bar.hidden;
+    return !this.bar.hidden && !this.bar.classList.contains("stopped");
   }
 }

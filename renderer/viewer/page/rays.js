@@ -34,8 +34,8 @@ export class Rays {
     return { type: "pick", seq: ++this.seq, ...asked, ...(proof === null ? {} : { proof }), settings };
   }
 
-  // Show the renderer's answer.
-  show(pick, scene) {
+  // Show the renderer's answer; `object` is the card's part of what was met.
+  show(pick, scene, object) {
     this.pick = pick;
     this.path = pathLines(pick);
     this.nodes = visitedLines(pick);
@@ -48,7 +48,7 @@ export class Rays {
       this.changed();
     };
     const aside = () => this.aside(pick);
-    showCard(this.card, pick, { scene, close: () => this.close(), toggle, chosen, aside, shown: this.showNodes });
+    showCard(this.card, pick, { scene, object, close: () => this.close(), toggle, chosen, aside, shown: this.showNodes });
     this.changed();
   }
 

@@ -59,6 +59,7 @@ export class Scenes {
     const { panel } = viewer;
     const before = this.kept ?? this.before;
     this.before = null;
+    const asked = continues(before, scene) ? viewer.picking.asked : null; // whose card is asked for again
     viewer.scene = scene;
     viewer.camera = new Camera(scene);
     if (stays(before, scene)) viewer.camera.state = before.camera;
@@ -77,6 +78,7 @@ export class Scenes {
     viewer.layout();
     viewer.setMode(viewer.offers(before?.mode) ? before.mode : viewer.mode);
     if (this.asked) this.goTo(this.asked);
+    if (asked) viewer.picking.ask(asked);
     if (TRACED.includes(viewer.mode)) viewer.busy.begin("tracing", "Tracing the first picture …");
     if (scene.faces <= MANY_FACES) this.loadMesh();
     this.tryBoxes();
@@ -161,6 +163,11 @@ export class Scenes {
     this.asked = null;
     this.viewer.busy.begin("opening", "Building the octree …");
     this.viewer.connection.send({ type: "hide", hidden });
+  }
+
+  // Hide these objects and no others; a section stays.
+  hideObjects(names) {
+    this.hide([...names, ...this.viewer.section.hidden]);
   }
 
   // What could not be shown is not asked for again with the next scene.

@@ -1,0 +1,74 @@
+// The object that a picked ray met: its name on the card, and what can be done with it from there.
+import { element } from "./element.js";
+
+// The least share of the picture that an object is fitted into where a card covers the rest.
+const LEAST = 0.25;
+
+// Whether a button was pressed by a key, whose user goes on from where the focus is.
+const byKey = (event) => event.detail === 0;
+
+function button(text, title, act) {
+  const made = element("button", { type: "button", textContent: text, title });
+  made.addEventListener("click", act);
+  return made;
+}
+
+export class ObjectCard {
+  constructor(viewer) {
+    Object.assign(this, { viewer, returning: null });
+  }
+
+  // The label and the buttons for a pick; null where it met no object.
+  part({ object: name, material }) {
+    const { objects } = this.viewer.scene;
+    const object = objects.find((one) => one.name === name);
+    if (!object) return null;
+    const buttons = [
+      button("Material", `Show ${material} in the panel`, (event) => this.showMaterial(material, byKey(event))),
+      button("Frame", "All of the object in view", () => this.frame(object)),
+    ];
+    return { label: object.label, buttons: objects.length > 1 ? [...buttons, ...this.hiding(object, objects)] : buttons };
+  }
+
+  hiding(object, objects) {
+    const alone = objects.every((one) => one.shown === (one === object));
+    const hide = button("Hide", "Leave the object out", () => this.hide(object));
+    hide.disabled = alone; // one is left to be seen
+    const others = objects.filter((one) => one !== object).map(({ name }) => name);
+    const isolate = button("Isolate", alone ? "Show all objects" : "Hide all other objects", (event) =>
+      this.isolate(alone ? [] : others, byKey(event)));
+    isolate.setAttribute("aria-pressed", String(alone));
+    // The card comes anew with the other scene.
+    if (this.returning && this.returning === this.viewer.picking.asked) queueMicrotask(() => isolate.focus());
+    this.returning = null;
+    return [hide, isolate];
+  }
+
+  showMaterial(name, focus) {
+    const { folds, edits } = this.viewer.panel;
+    const entry = edits.entryOf(name);
+    folds.reveal(entry);
+    if (focus) entry.querySelector("summary").focus({ preventScroll: true });
+  }
+
+  // Fit the object into the part of the picture whose middle is the picture's and that the card leaves free.
+  frame({ bounds }) {
+    const { camera, picking, size } = this.viewer;
+    const { x, width } = picking.free;
+    camera.fit(Math.max(width - 2 * Math.abs(x), (LEAST * size.w) / size.h), bounds);
+    this.viewer.moved();
+  }
+
+  hide({ name, label }) {
+    const { objects, rays, scenes, notices } = this.viewer;
+    rays.close();
+    scenes.hideObjects([...objects.hidden, name]);
+    notices.say(`Hidden: ${label}. Undo, or its switch under Objects, shows it again.`);
+  }
+
+  isolate(hidden, focus) {
+    const { picking, scenes } = this.viewer;
+    if (focus) this.returning = picking.asked;
+    scenes.hideObjects(hidden);
+  }
+}
