@@ -38,9 +38,9 @@ def pixels(scene: Scene, samples: int, stops: float = 0.0) -> Any:
 
 
 def test_alpha_is_the_share_of_a_pixel_that_a_box_covers() -> None:
-    """Of a film of 4 x 1 pixels the box covers one, a half, a quarter, and none; its colour is its own in each."""
+    """The whole of one, three quarters, a quarter, and none; its colour is its own in each."""
     camera = OrthographicCamera(eye=(0.0, 0.0, 5.0), target=(0.0, 0.0, 0.0), height=1.0)
-    parts = [((-2.0, -0.5), (1.0, 1.0)), ((-1.0, -0.5), (0.5, 1.0)), ((0.0, -0.5), (0.5, 0.5))]
+    parts = [((-2.0, -0.5), (1.0, 1.0)), ((-1.0, -0.5), (0.75, 1.0)), ((0.0, -0.5), (0.5, 0.5))]
     boxes = [
         SceneObject(mesh=box(), material="red", scale=(*size, 1.0), translate=(*corner, 0.0)) for corner, size in parts
     ]
@@ -48,8 +48,8 @@ def test_alpha_is_the_share_of_a_pixel_that_a_box_covers() -> None:
     scene = Scene(camera=camera, materials={"red": red}, objects=boxes, ambient=1, background=(0.1, 0.4, 0.9))
     scene = scene.altered(render=scene.render.model_copy(update={"resolution": (4, 1)}))
     found, _, matte = pixels(scene, 16)
-    assert matte.hits.tolist() == [[16, 8, 4, 0]]
-    assert found[0, :, 3].tolist() == [255, 128, 64, 0] and not found[0, 3].any()
+    assert matte.hits.tolist() == [[16, 12, 4, 0]]
+    assert found[0, :, 3].tolist() == [255, 192, 64, 0] and not found[0, 3].any()
     # Alpha is up to a 255th too large, by which the background shows in the colours.
     assert np.abs(decoded(found[0, :3, :3]) - (0.5, 0.2, 0.0)).max() < 1 / 255
     assert found[0, 0, :3].tolist() == srgb([0.5, 0.2, 0.0]).tolist()

@@ -29,7 +29,7 @@ export class Share {
     const { dressed: scene } = viewer;
     // At once, before anything moves.
     const { canvas, view, mode } = this.seen();
-    const { boxes } = viewer;
+    const { boxes } = viewer.scenes;
     const known = {
       scene: Object.fromEntries(TOLD.map((key) => [key, scene[key]])),
       view: { m: view.m, fovy: view.fovy, height: view.height, w: canvas.width, h: canvas.height },
