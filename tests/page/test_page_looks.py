@@ -112,11 +112,13 @@ HANDLE = """() => {
 def test_what_stands_on_the_picture_does_not_overlap(browser: Any, url: str, size: tuple[int, int]) -> None:
     with opened(browser, url, size=size, folded=True) as page:
         page.page.evaluate("() => viewer.notices.say('A notice that says a word or two.')")
-        names = ["#axes", "#scale", "#bar", "#hud", "#hint", "#legend", "#proof", "#notices p", "#progress"]
+        names = ["#axes", "#scale", "#pointed", "#bar", "#hud", "#hint", "#legend", "#proof", "#notices p", "#progress"]
         assert overlapping(page, names) == []
         page.page.evaluate("() => (viewer.panel.fields.aov.value = 'depth', viewer.changed('aov'))")
         page.page.wait_for_selector("#legend:not([hidden])")
         page.settled("octree")
+        page.page.mouse.move(*page.centre())
+        page.page.wait_for_selector("#pointed:not(:empty)")
         assert overlapping(page, names) == []
         # A proof that takes its time: the line that stands for it is shown whatever this machine needs.
         page.page.evaluate("() => (viewer.panel.fields.aov.value = 'color', viewer.changed('aov'))")
