@@ -292,7 +292,7 @@ def test_what_an_address_asked_for_is_forgotten_when_it_fails_and_when_the_user_
     viewer.shows("other.toml")
     opened = "() => { delete viewer.connection.send; return window.opened; }"
     assert viewer.page.evaluate(opened) == ["broken.toml", "other.toml"]
-    asks = "({ scenes } = viewer) => { scenes.goTo({ file: 'broken.toml', hidden: [], chosen: {} }); return "
+    asks = "() => { const { scenes } = viewer; scenes.goTo({ file: 'broken.toml', hidden: [], chosen: {} }); return "
     then = "[scenes.asked.file, (scenes.open('blocks.toml'), scenes.asked)]; }"
     assert viewer.page.evaluate(asks + then) == ["broken.toml", None]
     viewer.shows("blocks.toml")

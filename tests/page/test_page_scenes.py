@@ -233,7 +233,7 @@ def test_the_page_says_what_it_waits_for_and_then_no_more(browser: Any, url: str
 
 def test_no_wait_is_said_for_what_no_longer_comes(viewer: Viewer) -> None:
     """The line stood for ever where a mode was chosen, or brute force cancelled, before the first picture came."""
-    for end in ("viewer.setMode('gl')", "viewer.cancel()", "viewer.forget()"):
+    for end in ("viewer.setMode('gl')", "viewer.cancel()", "viewer.scenes.forget()"):
         viewer.page.evaluate("() => { viewer.busy.begin('tracing', 'x'); viewer.progress.show(0.5); }")
         viewer.page.evaluate(f"() => {{ {end}; }}")
         assert viewer.page.is_hidden("#busy")

@@ -57,7 +57,7 @@ function byLevel(levels) {
 
 // Fill and show `card`; `close()` is called by its button, `toggle(shown)` by the switch of the visited nodes,
 // `chosen(index)` for the ray that is pointed at, and `aside()`, where there is one, to see it from the side. `object`
-// has the label and the buttons of the object that was met, if there are any.
+// has the label of the object that was met, if there is one, and the buttons for it.
 export function showCard(card, pick, { scene, object, close, toggle, chosen, aside, shown }) {
   const list = element("dl");
   for (const [name, ...value] of rows(pick, scene, object)) list.append(element("dt", { textContent: name }), element("dd", {}, ...value));
@@ -72,7 +72,7 @@ export function showCard(card, pick, { scene, object, close, toggle, chosen, asi
   side.addEventListener("click", () => aside());
   const title = element("h2", { textContent: pick.hit ? "Ray" : "Ray into the open" });
   const proof = pick.proof ? values(pick.proof) : [];
-  const acts = object ? [element("div", { className: "buttons" }, ...object.buttons)] : [];
+  const acts = object?.buttons.length ? [element("div", { className: "buttons" }, ...object.buttons)] : [];
   const rays = [element("ul", { className: "legend" }, ...legend(pick.path)), ...rayTree(pick.path, chosen)];
   const nodesByLevel = pick.levels.length ? [byLevel(pick.levels)] : [];
   // Of a ray into the open there is little to say.

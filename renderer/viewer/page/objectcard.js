@@ -18,10 +18,18 @@ export class ObjectCard {
     Object.assign(this, { viewer, returning: null });
   }
 
+  // The object that a pick met; undefined for none.
+  objectOf({ object: name }) {
+    return this.viewer.scene.objects.find((one) => one.name === name);
+  }
+
+  labelOf(pick) {
+    return this.objectOf(pick)?.label ?? null;
+  }
+
   // The label and the buttons for a pick; null where it met no object.
-  part({ object: name, material }) {
-    const { objects } = this.viewer.scene;
-    const object = objects.find((one) => one.name === name);
+  part(pick) {
+    const { material } = pick, { objects } = this.viewer.scene, object = this.objectOf(pick);
     if (!object) return null;
     const buttons = [
       button("Material", `Show ${material} in the panel`, (event) => this.showMaterial(material, byKey(event))),

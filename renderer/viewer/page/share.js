@@ -38,6 +38,7 @@ export class Share {
       gain: viewer.layer?.gain ?? 1,
       boxes: { level: boxes.level, levels: boxes.levels, all: boxes.all },
       pick: viewer.rays.shown ? viewer.rays.pick : null,
+      object: viewer.rays.shown ? viewer.picking.object.labelOf(viewer.rays.pick) : null,
       note: this.lacks(scene),
     };
     const corners = new Blob([boxes.panes.corners]);

@@ -153,6 +153,7 @@ class Standalone {
     if (!rays.checked) card.hidden = true;
     else if (card.hidden)
       showCard(card, this.known.pick, {
+        object: this.known.object === null ? null : { label: this.known.object, buttons: [] },
         scene: this.known.scene,
         close: () => rays.click(),
         toggle: (shown) => {
