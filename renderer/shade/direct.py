@@ -91,7 +91,7 @@ def _aim_all(scene, bundle, surfaces, lit, count, light, rule, shadows):
         seen = see_light(scene.lights, light, p, n, error)
         if seen.faces:
             start, d, place = offset(shadows, _START + ROW * aimed), row3(bundle.directions, i), place_of(surface)
-            above = raised(scene, np.int64(place.face), place.u, place.v, p, n)
+            above = raised(scene, np.int64(place.face), place.u, place.v, p, n, n_g, error)
             if above.is_off:
                 ray = aim_off(seen, above.point)
                 put_no_start(start)

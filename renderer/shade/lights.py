@@ -88,7 +88,7 @@ def aim_from(arrays, surface, spot, n, light, offset):
     """
     scene = scene_pointers(arrays)
     seen = see_light(scene.lights, light, surface.p, n, surface.error)
-    start = raised(scene, spot.face, spot.u, spot.v, surface.p, n)
+    start = raised(scene, spot.face, spot.u, spot.v, surface.p, n, surface.n_g, surface.error)
     if start.is_off:
         return seen, aim_off(seen, start.point), True
     return seen, aim(seen, surface.p, surface.n_g, surface.error, offset), False

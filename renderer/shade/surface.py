@@ -158,9 +158,10 @@ class Raised(NamedTuple):
 
 
 @inlined
-def raised(scene, face, u, v, p, n):
+def raised(scene, face, u, v, p, n, n_g, error):
     """The point p at barycentrics u, v of a smooth face, ``Raised`` on the side of the shading normal n: the mean of
-    its images in the planes across the normals of the corners, where it is below them.
+    its images in the planes across the normals of the corners, where it is below them. It stays where that is within
+    p's ``error`` along the face's normal n_g, as on a flat part: from there a ray would meet the face itself.
 
     Shadow rays from there are not hidden by the faces next to it, of which the smooth surface has none.
     Hanika, Hacking the Shadow Terminator, in Ray Tracing Gems II, 2021.
@@ -170,7 +171,7 @@ def raised(scene, face, u, v, p, n):
     a, b, c = row3(scene.faces, face)
     up_a, up_b, up_c = _up_to(scene, a, p, n), _up_to(scene, b, p, n), _up_to(scene, c, p, n)
     up = barycentric(up_a, up_b, up_c, u, v)
-    return Raised(add(p, up), largest_component(up) > 0.0)
+    return Raised(add(p, up), abs(dot(up, n_g)) > error)
 
 
 @inlined
