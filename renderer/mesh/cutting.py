@@ -62,6 +62,7 @@ class _Cut:
     def __init__(self, ends: _Ends, heights: Floats, axis: int, at: float) -> None:
         self.edges, self.rows = np.unique(ends.edges, axis=0, return_inverse=True)
         low, high = heights[self.edges[:, 0]], heights[self.edges[:, 1]]
+        self.low_end, self.high_end = low == 0.0, high == 0.0
         self.share = (low / np.where(low == high, 1.0, low - high))[:, None]
         self.axis, self.at, self.count = axis, at, ends.count
 
@@ -72,8 +73,8 @@ class _Cut:
 
     def numbers(self, faces: Ints) -> Ints:
         """Faces whose new corners are numbered once an edge; one at an edge's end is the vertex there."""
-        share, own = self.share[:, 0], self.count + np.arange(len(self.edges))
-        own = np.where(share == 0.0, self.edges[:, 0], np.where(share == 1.0, self.edges[:, 1], own))
+        own = self.count + np.arange(len(self.edges))
+        own = np.where(self.low_end, self.edges[:, 0], np.where(self.high_end, self.edges[:, 1], own))
         return np.append(np.arange(self.count), own[self.rows.ravel()])[faces]
 
 

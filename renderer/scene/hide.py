@@ -11,7 +11,7 @@ from renderer.scene.scene import Instance, Scene
 
 FLOOR = "floor"
 # A half-space: all that has a coordinate greater, or less, than a number.
-_SIDE = re.compile(r"([xyz]) *([<>]) *([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
+_SIDE = re.compile(r"([xyz]) *([<>]) *([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)")
 
 
 def object_names(scene: Scene) -> tuple[str, ...]:

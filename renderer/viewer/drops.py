@@ -70,7 +70,8 @@ class Drops:
                 await _write({folder / name: number for name, number in files.items()}, content)
                 yield Arrived(folder, [*files])
             except Exception as error:  # which names the files as they are here
-                raise ValueError(str(error).replace(f"{folder}{os.sep}", "")) from error
+                told = str(error).replace(f"{folder}{os.sep}", "").replace(str(folder), "its folder")
+                raise ValueError(told) from error
             undoing.pop_all()
 
     def _remove(self, folder: Path, size: int) -> None:

@@ -20,6 +20,13 @@ def kept(page: Viewer) -> tuple[NDArray[np.uint8], dict[str, Any]]:
     return page.pixels("picture"), page.page.evaluate("() => viewer.proof.told")
 
 
+def test_no_difference_is_said_of_a_comparison_alone(page: Viewer) -> None:
+    """It stood on the picture before one came, and stayed in every other mode."""
+    page.page.evaluate("() => { viewer.proof.forget(); viewer.proof.toggle(); }")
+    assert page.page.is_hidden("#no-difference")
+    page.page.evaluate("() => viewer.proof.toggle()")
+
+
 def test_the_page_shows_both_pictures_and_the_difference(page: Viewer) -> None:
     page.choose("proof")
     page.page.select_option("[name=pair]", "samples")

@@ -153,7 +153,7 @@ def test_a_model_of_very_many_faces_is_fetched_when_it_is_to_be_seen(browser: An
         answer = route.fetch()
         route.fulfill(response=answer, json=answer.json() | {"faces": 1_000_001})
 
-    page.page.route(re.compile("/scene"), many)
+    page.page.route(re.compile(r"/scene\?"), many)
     try:
         page.open()
         assert not any(asked)

@@ -31,6 +31,17 @@ def test_a_kept_view_is_seen_again_after_the_page_is_loaded_again(viewer: Viewer
     assert viewer.page.locator("#views li").count() == 0
 
 
+def test_kept_views_that_are_none_do_not_stop_the_page(viewer: Viewer) -> None:
+    kept = '{"blocks.toml": [3, {"name": 5}, {"name": "View 1", "address": "#mode=gl"}]}'
+    for content in ('{"blocks.toml": 5}', kept):
+        viewer.page.evaluate("(content) => localStorage.setItem('octree-render-views', content)", content)
+        viewer.page.reload()
+        viewer.page.wait_for_selector("body[data-ready]")
+        viewer.settled("octree")
+    assert viewer.page.locator("#views li").count() == 1
+    viewer.page.evaluate("() => localStorage.removeItem('octree-render-views')")
+
+
 @pytest.mark.parametrize("size", [3e-9, 0.02, 1.0, 7.3, 999.0, 4e8])
 def test_the_scale_bar_is_as_long_as_it_says(viewer: Viewer, size: float) -> None:
     """And between a half and all of the room that it has, by a round number."""

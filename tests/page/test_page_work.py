@@ -227,6 +227,26 @@ def test_the_scene_is_cut_open_and_turned(viewer: Viewer, scenes: Path) -> None:
     shows(viewer, scene)
 
 
+def test_a_section_that_leaves_nothing_is_refused_and_the_controls_say_what_is_shown(viewer: Viewer) -> None:
+    """And an address with one loses that alone; of two sections the panel changes the first."""
+    viewer.page.select_option("#section select", "x")
+    viewer.page.wait_for_function("() => viewer.section.hidden.length")
+    settled(viewer)
+    said, place = viewer.page.inner_text("#section output"), viewer.page.input_value("#section input")
+    viewer.page.locator("#section input").fill("0")
+    viewer.page.locator("#notices p", has_text="at least one face").wait_for()
+    assert (viewer.page.inner_text("#section output"), viewer.page.input_value("#section input")) == (said, place)
+    viewer.page.evaluate("() => viewer.scenes.goTo({ mode: 'gl', hidden: ['x > -1e9'], chosen: {} })")
+    viewer.settled("gl")
+    viewer.page.evaluate("() => viewer.scenes.goTo({ mode: 'octree', hidden: ['x > 0.1', 'y < 0.2'], chosen: {} })")
+    viewer.page.wait_for_function("() => String(viewer.section.hidden) === 'x > 0.1,y < 0.2'")
+    settled(viewer)
+    viewer.page.select_option("#section select", "")
+    viewer.page.wait_for_function("() => String(viewer.section.hidden) === 'y < 0.2'")
+    viewer.page.evaluate("() => viewer.scenes.hide([])")
+    viewer.page.wait_for_function("() => !viewer.section.hidden.length")
+
+
 def test_the_last_object_cannot_be_hidden(viewer: Viewer) -> None:
     for name in ("objects.0", "objects.1"):
         before = viewer.page.evaluate("() => viewer.scene.id")
@@ -482,7 +502,7 @@ def test_each_change_is_undone_and_done_again(browser: Any, url: str) -> None:
     with Viewer(browser, url) as page:
         page.open()
         told(page)
-        assert page.page.is_disabled("#undo")
+        assert page.page.is_disabled("#undo") and page.page.is_disabled("#redo")
         first = page.camera
         page.drag(60, 10)
         settled(page)
@@ -510,6 +530,7 @@ def test_each_change_is_undone_and_done_again(browser: Any, url: str) -> None:
             page.page.click("#redo")
             page.page.wait_for_timeout(300)
         page.page.wait_for_function("() => viewer.panel.settings.edits?.materials.red.diffuse[1] === 0.5")
+        page.page.wait_for_selector("#redo:disabled")
         settled(page)
         assert page.camera == turned
 

@@ -13,6 +13,8 @@ function kept() {
   }
 }
 
+const isView = (one) => typeof one?.name === "string" && typeof one.address === "string";
+
 export class Bookmarks {
   // `seen()` is the address of what is seen, and `go(address)` shows another one.
   constructor(list, { seen, go, say }) {
@@ -25,7 +27,8 @@ export class Bookmarks {
   }
 
   get views() {
-    return kept()[this.scene] ?? [];
+    const views = kept()[this.scene];
+    return Array.isArray(views) ? views.filter(isView) : [];
   }
 
   set views(views) {

@@ -5,6 +5,7 @@ import { LineSet } from "./lines.js";
 // From the root to the leaves: violet over blue and green to yellow (viridis, lightened so that lines read on any
 // background).
 const LEVELS = [[163, 113, 247], [122, 139, 255], [79, 163, 255], [52, 190, 235], [45, 210, 190], [84, 222, 140], [160, 230, 95], [222, 228, 80]];
+const MANY_SHADOWS = 24;
 const VISITED = [255, 170, 40];
 const LEAF = [255, 92, 40];
 export const KINDS = {
@@ -51,13 +52,16 @@ export const shownKind = ({ kind, hit }) => (kind === "shadow" && hit ? "blocked
 // The rays of a picked pixel and the point that each of them met. Where one is `chosen` by its index, the others fade.
 export function pathLines(pick, chosen = -1) {
   const set = new LineSet();
+  // Those to the many lights of a sky would hide what they are about.
+  const many = pick.path.filter(({ kind }) => kind === "shadow").length > MANY_SHADOWS;
   pick.path.forEach((segment, i) => {
     const shadow = segment.kind === "shadow";
     const faded = chosen >= 0 && i !== chosen;
-    const color = [...KINDS[shownKind(segment)], faded ? 70 : shadow && i !== chosen ? 215 : 255];
-    const width = (shadow ? 2 : 3) * (i === chosen ? 1.8 : 1);
+    const thin = shadow && many && i !== chosen;
+    const color = [...KINDS[shownKind(segment)], thin || faded ? 70 : shadow && i !== chosen ? 215 : 255];
+    const width = (thin ? 1 : shadow ? 2 : 3) * (i === chosen ? 1.8 : 1);
     set.add(segment.start, segment.end, color, width, shadow && segment.hit ? 9 : 0);
-    if (segment.hit) set.add(segment.end, segment.end, color, shadow ? 6 : 9);
+    if (segment.hit && !thin) set.add(segment.end, segment.end, color, shadow ? 6 : 9);
   });
   return set;
 }

@@ -6,7 +6,8 @@ const REST = 400;
 export class Past {
   // `written()` gives the address of what is seen now.
   constructor(written, undo, redo) {
-    Object.assign(this, { written, undoing: undo, timer: null, came: true });
+    // `furthest` counts the steps to the last view that Redo leads to.
+    Object.assign(this, { written, undoing: undo, redoing: redo, timer: null, came: true, furthest: 0 });
     undo.addEventListener("click", () => this.undo());
     redo.addEventListener("click", () => this.redo());
   }
@@ -33,9 +34,14 @@ export class Past {
     const hash = this.written();
     const address = location.pathname + location.search + hash;
     if (this.came) history.replaceState({ steps: this.steps }, "", address);
-    else if (hash !== location.hash) history.pushState({ steps: this.steps + 1 }, "", address);
+    else if (hash !== location.hash) {
+      history.pushState({ steps: this.steps + 1 }, "", address);
+      this.furthest = this.steps;
+    }
     this.came = false;
+    this.furthest = Math.max(this.furthest, this.steps);
     this.undoing.disabled = this.steps === 0;
+    this.redoing.disabled = this.steps === this.furthest;
   }
 
   undo() {

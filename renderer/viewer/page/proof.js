@@ -110,7 +110,7 @@ export class Proof {
     this.divider.style.left = `${100 * this.split}%`;
     this.divider.setAttribute("aria-valuenow", Math.round(100 * this.split));
     for (const label of this.names) label.hidden = !split;
-    this.none.hidden = !this.differences || this.told?.identical !== this.told?.pixels;
+    this.none.hidden = !this.told || !this.differences || this.told.identical !== this.told.pixels;
     this.changed();
   }
 }

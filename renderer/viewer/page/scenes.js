@@ -170,12 +170,16 @@ export class Scenes {
     this.hide([...names, ...this.viewer.section.hidden]);
   }
 
-  // What could not be shown is not asked for again with the next scene.
+  // What could not be shown is not asked for again with the next scene; of an address all else is.
   refused() {
-    const { scene, panel } = this.viewer;
+    const { scene, panel, objects, section } = this.viewer;
     if (!scene) return;
     panel.fields.file.value = scene.name; // the one that is still shown
+    objects.load(scene);
+    section.load(scene);
+    const { asked } = this;
     this.asked = null;
+    if (asked?.hidden === null) this.goTo(asked);
   }
 
   async loadMesh() {

@@ -48,17 +48,19 @@ export class Section {
     return this.bounds.map((corner) => corner["xyz".indexOf(this.axis.value)]);
   }
 
-  // Where the slider is, to a thousandth of the scene.
+  // Where the slider is, to a thousandth of the scene; at its ends, those of the scene.
   get at() {
-    const [lower, upper] = this.ends;
+    const [lower, upper] = this.ends, share = this.place.valueAsNumber / STEPS;
+    if (share === 0 || share === 1) return share ? upper : lower;
     const step = (upper - lower) / STEPS;
     const digits = Math.max(0, Math.ceil(-Math.log10(step || 1)));
-    return Number((lower + step * this.place.valueAsNumber).toFixed(Math.min(digits, 100)));
+    return Number((lower + share * (upper - lower)).toFixed(Math.min(digits, 100)));
   }
 
-  // What is to be hidden.
+  // What is to be hidden: of several sides, which an address may have, the first is chosen here.
   get chosen() {
-    return this.axis.value ? [`${this.axis.value} ${this.sign} ${this.at}`] : [];
+    const first = this.axis.value ? [`${this.axis.value} ${this.sign} ${this.at}`] : [];
+    return [...first, ...this.hidden.slice(1)];
   }
 
   // Whether `sides` are others than those that are hidden now.
