@@ -220,9 +220,11 @@ def test_the_scene_is_cut_open_and_turned(viewer: Viewer, scenes: Path) -> None:
         settled(viewer)
         shows(viewer, without(scene, wanted))
         assert viewer.camera == camera
+    seen = "() => String(viewer.scenes.hidden)"
     viewer.page.evaluate("() => viewer.past.write()")
-    viewer.page.click("#undo")
-    viewer.page.wait_for_function("() => !viewer.scenes.hidden.length")
+    while before := viewer.page.evaluate(seen):
+        viewer.page.click("#undo")
+        viewer.page.wait_for_function("(before) => String(viewer.scenes.hidden) !== before", arg=before)
     settled(viewer)
     shows(viewer, scene)
 
