@@ -91,6 +91,7 @@ export class Measure {
   found(points, distance) {
     Object.assign(this, { points, lines: points.length ? linesOf(points) : NONE });
     this.label.textContent = distance ? told(distance) : "";
+    if (!distance) this.label.hidden = true; // at once; where it stands, the next drawing says
     this.card.hidden = !this.on;
     if (this.on) this.fill(distance);
     this.viewer.frames.request();
