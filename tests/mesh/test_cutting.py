@@ -38,6 +38,9 @@ def test_the_halves_are_the_whole_and_close_each_other(axis: int, step: int, see
         assert area(halves[0]) + area(halves[1]) == pytest.approx(once, rel=1e-12)
         if mesh is not soup and not flat.any():
             assert len(Mesh.concatenate(halves).open_edges) == 0
+            for half in halves:  # faces share their new corners, and none is without area
+                assert len(np.unique(half.vertices, axis=0)) == len(half.vertices)
+                assert (half.face_normals() != 0).any(axis=1).all()
 
 
 def test_what_vertices_carry_is_interpolated_and_parts_stay() -> None:

@@ -144,6 +144,8 @@ def test_text_has_its_bytes_in_itself_or_beside_it(where: str, tmp_path: Path) -
         (tmp_path / uri.replace("%20", " ")).write_bytes(glb.data)
     (tmp_path / "a.gltf").write_text(json.dumps({**document, "buffers": [{"byteLength": len(glb.data), "uri": uri}]}))
     assert load_mesh(tmp_path / "a.gltf").triangles.tolist() == [TRIANGLE]
+    if where == "data":
+        assert load_mesh((tmp_path / "a.gltf").read_bytes()).triangles.tolist() == [TRIANGLE]
 
 
 def test_what_has_no_place_in_a_mesh_is_named_once(tmp_path: Path) -> None:

@@ -97,6 +97,9 @@ def test_faces_that_cancel_bound_nothing_and_it_is_said() -> None:
     with pytest.raises(ValueError, match=message):
         both.contains([0.5, 0.5, 0.5])
     assert not both.contains([0.5, 0.5, 0.5], rule="even-odd")
+    needle = Mesh(both.mesh.vertices, np.vstack([both.mesh.faces, [[0, 0, 1]]]))  # which bounds nothing
+    with pytest.raises(ValueError, match=r"Mesh\.without_duplicates\(\)"):
+        Octree(needle).contains([0.5, 0.5, 0.5])
     # A body beside them has an inside, as has one that is there twice the same way round.
     beside = Mesh.concatenate(box(), TURNED, box((3, 0, 0), (4, 1, 1)))
     assert Octree(beside).contains([[3.5, 0.5, 0.5], [0.5, 0.5, 0.5]]).tolist() == [True, False]

@@ -9,8 +9,9 @@ import tomlkit
 from cases import cases
 from varied import BASE, VARIATIONS, Table, Variation, picture, scene_of
 
-from renderer import Hits, Mesh, Octree, RenderSettings, Scene, Sky
+from renderer import Hits, Mesh, Octree, Phong, RenderSettings, Scene, SceneObject, Sky
 from renderer.cli.main import main
+from renderer.mesh.shapes import icosphere
 from renderer.scene.camera import Camera
 from renderer.scene.change import _Changes, changed
 from renderer.scene.hide import object_names
@@ -81,6 +82,16 @@ def test_a_background_takes_the_place_of_a_sky_and_a_sky_of_a_background(
 ) -> None:
     found = written_by(folder, before, tomlkit.dumps({top: after[top]}))
     assert found.tobytes() == picture(scene_of(folder, after)).radiance.tobytes()
+
+
+def test_a_smooth_body_keeps_its_normals_at_the_cut() -> None:
+    """Those of the faces that are left alone bend towards it."""
+    ball = SceneObject(mesh=icosphere(2), material="grey", normals="smooth")
+    eye = {"eye": (0, 0, 5), "target": (0, 0, 0)}
+    scene = Scene(camera=eye, materials={"grey": Phong()}, objects=[ball])
+    (left,) = changed(scene, 'hide = ["x > 0.1"]').instances
+    slant = np.einsum("ij,ij->i", left.normals, left.mesh.vertices) / np.linalg.norm(left.normals, axis=1)
+    assert (slant / np.linalg.norm(left.mesh.vertices, axis=1)).min() > 0.99
 
 
 @cases("name", ["objects.0", "objects.1", "objects.2", "floor"])

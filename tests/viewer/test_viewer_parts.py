@@ -10,7 +10,7 @@ from viewer_client import SIZE, looking
 
 from renderer.mesh.mesh import Mesh
 from renderer.scene.scene import Instance
-from renderer.viewer.parts import Part, part_of_face
+from renderer.viewer.parts import Part, part_of_face, parts_of
 from renderer.viewer.payload import description
 from renderer.viewer.pick import picked
 from renderer.viewer.protocol import Pick
@@ -34,6 +34,18 @@ def test_each_face_belongs_to_the_object_whose_corners_it_has(whole: ShownScene,
             assert told["bounds"] == [corners.min(axis=0).tolist(), corners.max(axis=0).tolist()]
         first = faces.stop
     assert first == len(mesh.faces)
+
+
+@cases("hidden", [["x > 0"], ["objects.0", "x < 0"], ["floor", "z > 0.1", "y > 0.5"]])
+def test_faces_that_a_section_leaves_belong_to_their_object(whole: ShownScene, hidden: list[str]) -> None:
+    shown = hiding(whole, hidden)
+    names = [part.name for part in parts_of(whole.scene) if part.name not in hidden]
+    first = 0
+    for name, instances in zip(names, (part.instances for part in parts_of(shown.scene)), strict=True):
+        faces = range(first, first + sum(len(one.mesh.faces) for one in instances))
+        assert {part_of_face(shown, face).name for face in faces} <= {name}
+        first = faces.stop
+    assert 0 < first == len(shown.prepared.mesh.faces)
 
 
 def test_a_click_names_the_object_behind_one_that_is_hidden(whole: ShownScene) -> None:
