@@ -172,7 +172,12 @@ class Session:
                 self.saves.put(message)
             elif isinstance(message, AskCommand):
                 dropped = self.host.is_dropped(self.shown)
-                expect(not dropped, "command", "a file of the renderer's machine", "one that was dropped on the page")
+                expect(
+                    not dropped,
+                    "command",
+                    "a file in a folder of yours",
+                    "one that this page has opened, of which there is a copy",
+                )
                 await self._tell(type="command", text=command_of(self.shown, message))
             elif isinstance(message, Still | Turntable):
                 self.exporter.begin(self.shown, message)

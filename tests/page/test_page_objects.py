@@ -106,3 +106,21 @@ def test_what_is_alone_in_its_scene_is_neither_hidden_nor_isolated(viewer: Viewe
         }"""
     )
     assert texts == ["Material", "Frame"]
+
+
+FITTED = """({ objects, bounds }) => viewer.objects.constructor.prototype.fitted.call({ objects }, bounds)"""
+
+
+def test_fit_leaves_out_a_floor_that_is_much_larger_than_what_stands_on_it(viewer: Viewer) -> None:
+    """Of a mesh without a scene it made a dot. What a section or a switch hides does not count."""
+    thing, other = ({"name": f"objects.{k}", "shown": not k, "bounds": [[k, 0, 0], [k + 1, 1, 1]]} for k in (0, 4))
+    for size, expected in ((9, [[0, 0, 0], [0.5, 1, 1]]), (1, [[-1, 0, -1], [0.5, 1, 1]])):
+        floor = {"name": "floor", "shown": True, "bounds": [[-size, 0, -size], [size, 0, size]]}
+        given = {"objects": [thing, other, floor], "bounds": [[-size, 0, -size], [0.5, 1, max(size, 1)]]}
+        assert viewer.page.evaluate(FITTED, given) == expected
+    assert viewer.page.evaluate(FITTED, {"objects": [floor], "bounds": given["bounds"]}) == given["bounds"]
+
+
+def test_from_below_it_is_said_that_the_floor_hides_the_scene(viewer: Viewer) -> None:
+    viewer.page.evaluate("() => viewer.look(viewer.camera.sides.bottom)")
+    viewer.page.locator("#notices p", has_text="The floor hides").wait_for()

@@ -145,6 +145,7 @@ def test_a_picture_that_is_not_finished_is_saved_when_it_is(odd: Viewer, tmp_pat
     odd.page.evaluate(HOLD, "ack")
     odd.page.evaluate("() => { viewer.camera.orbit(0.4, 0); viewer.moved(); }")
     odd.page.wait_for_function("() => window.held.some(({ seq, step }) => seq === viewer.traced.seq && step === 0)")
+    odd.page.locator("#busy", has_text="finer picture").wait_for()
     odd.page.click("#save-picture")
     assert "when it is finished" in odd.page.inner_text("#notices")
     with odd.page.expect_download() as saved:

@@ -90,7 +90,7 @@ def test_a_scene_is_shown_with_the_meshes_that_came_with_it(url: str, client: Cl
         shown = description(url, id=client.told("scene")["id"])
         assert (shown["name"], shown["faces"], shown["files"]) == ("mine.toml", own["faces"], files)
     client.send(type="command", mode="octree", **VIEW)
-    assert client.told("error")["message"].startswith("command: expected a file of the renderer's machine, got")
+    assert client.told("error")["message"].startswith("command: expected a file in a folder of yours, got")
     client.send(type="scene", file="blocks.toml")
     assert description(url, id=client.told("scene")["id"])["name"] == "blocks.toml"
 

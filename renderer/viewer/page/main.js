@@ -34,6 +34,9 @@ import { SLOW, TRACED, Traced } from "./traced.js";
 
 const TOO_LARGE = "What this page sends of the change is too large for the server; it is shown once it is smaller.";
 
+// Radians below the horizon from which a floor is in the way.
+const BELOW = 1.2;
+
 const find = (selector) => document.querySelector(selector);
 
 class Viewer {
@@ -213,13 +216,15 @@ class Viewer {
   }
 
   fit() {
-    this.camera.fit(this.size.w / this.size.h);
+    this.camera.fit(this.size.w / this.size.h, this.objects.fitted(this.scene.bounds));
     this.moved();
   }
 
   look(direction) {
     this.camera.lookFrom(direction);
     this.moved();
+    const floor = this.scene.objects.some(({ name, shown }) => name === "floor" && shown);
+    if (floor && this.camera.pitch < -BELOW) this.notices.say("The floor hides what stands on it; its switch under Objects hides the floor.");
   }
 
   moved() {

@@ -17,7 +17,7 @@ export function roundedUp(x) {
 
 export const told = ({ length, bound }) => `${length} ± ${roundedUp(bound)}`;
 
-const vector = (v) => v.map(String).join("\n");
+const vector = (v) => v.map((x, k) => `${"xyz"[k]} ${x}`).join("\n");
 
 function rows(points, distance) {
   const axes = distance ? ["dx", "dy", "dz"].map((name, k) => [name, String(distance.vector[k])]) : [];

@@ -24,6 +24,12 @@ export class Saving {
     notices.say(`Saved: ${savePicture(frames.layers, scene.name)}`);
   }
 
+  // Another scene has come, whose picture it is not.
+  give() {
+    if (this.waiting) this.viewer.notices.say("The picture was not saved: the scene has changed.");
+    this.stop();
+  }
+
   stop() {
     this.waiting = false;
     this.viewer.notices.clear("saving");

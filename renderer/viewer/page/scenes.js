@@ -95,8 +95,8 @@ export class Scenes {
     viewer.proof.forget();
     viewer.legend.show(null);
     viewer.layer?.begin(viewer.dressed);
-    viewer.saving.stop();
-    for (const name of ["mesh", "tracing"]) viewer.busy.end(name);
+    viewer.saving.give();
+    for (const name of ["mesh", "tracing", "finer"]) viewer.busy.end(name);
   }
 
   // What there is to come back to; null before there is a scene.

@@ -10,6 +10,9 @@ export const STALE = 250;
 // Brute force starts once the camera rests: a picture of seconds is not worth starting in each frame.
 export const REST = 150;
 
+// Milliseconds after which a coarse picture is said to be one.
+const SLOWLY = 1000;
+
 export class Traced {
   constructor(viewer) {
     Object.assign(this, { viewer, seq: 0, sent: new Map(), shown: null, dirty: true, movedAt: 0, staleSince: null });
@@ -22,6 +25,7 @@ export class Traced {
     else this.staleSince ??= now;
     this.dirty = true;
     this.movedAt = now;
+    this.expect(false);
   }
 
   // Another kind of picture is wanted at once.
@@ -39,6 +43,7 @@ export class Traced {
   // What was sent last is not wanted, nor is a change that was waiting for the camera to rest.
   cancel() {
     this.dirty = false;
+    this.expect(false);
     this.sent.delete(this.seq);
   }
 
@@ -143,10 +148,18 @@ export class Traced {
     this.shown = { view, w, h, seq, step, last, samples, legend: view.legend ?? null };
     this.staleSince = this.placed ? null : performance.now();
     viewer.busy.end("tracing");
+    this.expect(!last);
     if (picture.kind === PROOF && this.valid) proof.tell(view.legend);
     frames.note(picture, { ...view, w, h });
     frames.draw();
     if (last && this.proofOf(picking.asked) !== null) picking.again();
+  }
+
+  // Say that a finer picture is on its way, if it takes its time.
+  expect(more) {
+    clearTimeout(this.expected);
+    this.viewer.busy.end("finer");
+    if (more) this.expected = setTimeout(() => this.coming && this.viewer.busy.begin("finer", "Tracing a finer picture …"), SLOWLY);
   }
 
   // What the values of a view's picture mean, before it comes.
