@@ -91,7 +91,7 @@ def test_a_smooth_body_keeps_its_normals_at_the_cut() -> None:
     scene = Scene(camera=eye, materials={"grey": Phong()}, objects=[ball])
     (left,) = changed(scene, 'hide = ["x > 0.1"]').instances
     slant = np.einsum("ij,ij->i", left.normals, left.mesh.vertices) / np.linalg.norm(left.normals, axis=1)
-    assert (slant / np.linalg.norm(left.mesh.vertices, axis=1)).min() > 0.99
+    assert (slant / np.linalg.norm(left.mesh.vertices, axis=1)).min() > 0.9999  # of those of the half alone 0.995
 
 
 @cases("name", ["objects.0", "objects.1", "objects.2", "floor"])
