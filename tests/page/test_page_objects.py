@@ -39,6 +39,7 @@ def test_an_object_is_hidden_from_its_card_and_undo_brings_it_back(viewer: Viewe
     assert "stairs" in viewer.page.inner_text("#notices")
     viewer.page.click("#undo")
     hidden(viewer, [])
+    assert "stairs" not in viewer.page.inner_text("#notices")
 
 
 def test_an_object_is_isolated_and_its_card_shows_all_again(viewer: Viewer) -> None:

@@ -21,6 +21,11 @@ export class Notices {
     this.list.append(notice);
   }
 
+  // Remove what begins with `text`.
+  withdraw(text) {
+    for (const old of [...this.list.children]) if (old.textContent.startsWith(text)) old.remove();
+  }
+
   clear(name) {
     this.list.querySelector(`[data-name="${name}"]`)?.remove();
   }

@@ -4,6 +4,9 @@ import { element } from "./element.js";
 // The least share of the picture that an object is fitted into where a card covers the rest.
 const LEAST = 0.25;
 
+// How a notice of a hidden object begins, which is not true any more once others are hidden.
+export const HIDDEN = "Hidden:";
+
 // Whether a button was pressed by a key, whose user goes on from where the focus is.
 const byKey = (event) => event.detail === 0;
 
@@ -71,7 +74,7 @@ export class ObjectCard {
     const { objects, rays, scenes, notices } = this.viewer;
     rays.close();
     scenes.hideObjects([...objects.hidden, name]);
-    notices.say(`Hidden: ${label}. Undo, or its switch under Objects, shows it again.`);
+    notices.say(`${HIDDEN} ${label}. Undo, or its switch under Objects, shows it again.`);
   }
 
   isolate(hidden, focus) {

@@ -5,6 +5,7 @@ import { fetchFrom } from "./connection.js";
 import { heading } from "./element.js";
 import { continues, kept, remember, remembered, stays } from "./memory.js";
 import { fetchBoxes } from "./nodes.js";
+import { HIDDEN } from "./objectcard.js";
 import { NO_BOXES } from "./overlay.js";
 import { isSide } from "./section.js";
 import { TRACED } from "./traced.js";
@@ -161,6 +162,7 @@ export class Scenes {
 
   hide(hidden) {
     this.asked = null;
+    this.viewer.notices.withdraw(HIDDEN);
     this.viewer.busy.begin("opening", "Building the octree …");
     this.viewer.connection.send({ type: "hide", hidden });
   }

@@ -155,11 +155,11 @@ export class Traced {
     if (last && this.proofOf(picking.asked) !== null) picking.again();
   }
 
-  // Say that a finer picture is on its way, if it takes its time.
+  // Say that a finer picture is on its way, if it takes its time; slow modes have a bar that says it.
   expect(more) {
     clearTimeout(this.expected);
     this.viewer.busy.end("finer");
-    if (more) this.expected = setTimeout(() => this.coming && this.viewer.busy.begin("finer", "Tracing a finer picture …"), SLOWLY);
+    if (more && !SLOW.includes(this.viewer.mode)) this.expected = setTimeout(() => this.coming && this.viewer.busy.begin("finer", "Tracing a finer picture …"), SLOWLY);
   }
 
   // What the values of a view's picture mean, before it comes.
