@@ -68,7 +68,7 @@ def test_the_sky_has_no_point_and_the_first_one_stays(measuring: Viewer) -> None
         and measuring.page.evaluate("() => viewer.measure.pixels") == []
     )
     click(measuring, STAIRS, SKY, FLOOR)
-    assert measuring.page.is_visible("#distance")
+    measuring.page.wait_for_selector("#distance:not([hidden])")
 
 
 def test_escape_ends_it_and_a_click_follows_a_ray_again(measuring: Viewer) -> None:
