@@ -91,7 +91,7 @@ def test_the_line_is_drawn_in_every_mode(measuring: Viewer, mode: str) -> None:
     measuring.choose(mode)
     plain = measuring.pixels("gl")
     click(measuring, STAIRS, FLOOR)
-    measuring.page.wait_for_timeout(100)
+    measuring.page.wait_for_selector("#distance:not([hidden])")
     drawn = (measuring.pixels("gl") != plain).any(axis=2)
     # The label is above the line, whose middle is seen.
     x, y = np.add(measuring.centre(), np.add(STAIRS, FLOOR) / 2)
