@@ -50,6 +50,21 @@ def seen(page: Viewer, faces: str) -> NDArray[np.uint8]:
     return page.pixels("gl")[..., :3]
 
 
+@pytest.mark.parametrize("faces", ["smooth", "flat", "wireframe"])
+def test_faces_of_each_kind_are_exposed(page: Viewer, faces: str) -> None:
+    """The exposure was that of smooth ones alone."""
+    before = seen(page, faces).astype(int)
+    page.page.locator("[name=exposure]").fill("1")
+    page.settled("gl")
+    after = page.pixels("gl")[..., :3].astype(int)
+    page.page.locator("[name=exposure]").fill("0")
+    page.settled("gl")
+    assert after[0, 0].tolist() == [round(255 * (1.055 * (2 * c) ** (1 / 2.4) - 0.055)) for c in (0.2, 0.4, 0.5)]
+    assert (after.reshape(-1, 3) >= before.reshape(-1, 3)).all(axis=1).mean() > 0.9
+    middle = tuple(side // 2 for side in after.shape[:2])
+    assert (after[middle] > before[middle]).all()
+
+
 def test_flat_faces_have_one_colour_each(page: Viewer) -> None:
     """That of their own normals, but for pixels that two faces share."""
     corners = MESH.vertices[MESH.faces]

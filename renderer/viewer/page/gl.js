@@ -1,6 +1,6 @@
 // The WebGL layer: the model and lines over it, or lines alone over a traced picture.
 import { clipMatrix, dot, norm, scale, add, seenFrom, sub } from "./matrix.js";
-import { DEPTH, LIT, Model } from "./model.js";
+import { DEPTH, LIGHTED, Model } from "./model.js";
 import { Boxes } from "./boxes.js";
 import { Lines } from "./lines.js";
 
@@ -71,7 +71,7 @@ export class GlLayer {
     const seen = layers.filter(({ set }) => set.count);
     gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
     const dark = NIGHT.map((c) => c * veil);
-    const gain = shading === LIT ? this.gain : 1;
+    const gain = LIGHTED.includes(shading) ? this.gain : 1;
     const sky = this.scene.background.map((c, i) => srgb(c * gain) * (1 - veil) + dark[i]);
     gl.clearColor(...(shading === DEPTH ? [...dark, veil] : [...sky, 1]));
     gl.enable(gl.DEPTH_TEST);

@@ -21,7 +21,7 @@ export const DEPTH = 2;
 export const FLAT = 3;
 export const WIREFRAME = 4;
 
-const LIGHTED = [LIT, FLAT, WIREFRAME];
+export const LIGHTED = [LIT, FLAT, WIREFRAME];
 
 // Each shading of what is opaque and of glass is a program of its own, so that none moves values it does not look at:
 // software GL, and whoever has only that, spends its time on the values of corners.
