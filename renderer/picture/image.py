@@ -210,8 +210,7 @@ class Image:
         if suffix == ".npy":
             write_atomically(path, lambda file: write_array(file, self.radiance))
         elif suffix == ".exr":
-            content = exr_of(self, Path(path).resolve().parent)
-            write_atomically(path, lambda file: file.write(content))
+            write_exr(path, self.radiance, self._layers())
         else:
             write_atomically(path, self._write_png)
 

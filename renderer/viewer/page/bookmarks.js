@@ -1,17 +1,12 @@
 // Views that the user keeps, by their addresses, for each scene in this browser.
-import { element } from "./element.js";
+import { button, element } from "./element.js";
+import { read, write } from "./stored.js";
 
 const KEY = "octree-render-views";
 const MOST = 50;
 
-// Some frames and private windows keep nothing.
-function kept() {
-  try {
-    return JSON.parse(localStorage.getItem(KEY)) ?? {};
-  } catch {
-    return {};
-  }
-}
+// The views of all scenes.
+const kept = () => read("localStorage", KEY) ?? {};
 
 const isView = (one) => typeof one?.name === "string" && typeof one.address === "string";
 
@@ -32,11 +27,8 @@ export class Bookmarks {
   }
 
   set views(views) {
-    try {
-      localStorage.setItem(KEY, JSON.stringify({ ...kept(), [this.scene]: views }));
-    } catch {
-      this.say("This browser keeps no views for this page; the address in its bar holds this one.");
-    }
+    const done = write("localStorage", KEY, { ...kept(), [this.scene]: views });
+    if (!done) this.say("This browser keeps no views for this page; the address in its bar holds this one.");
     this.show();
   }
 
@@ -49,11 +41,9 @@ export class Bookmarks {
 
   show() {
     this.list.replaceChildren(...this.views.map((view, i) => {
-      const go = element("button", { type: "button", textContent: view.name });
-      go.addEventListener("click", () => this.go(view.address));
-      const remove = element("button", { type: "button", textContent: "×", className: "remove", ariaLabel: `Remove ${view.name}`, title: "Remove" });
-      remove.addEventListener("click", () => (this.views = this.views.toSpliced(i, 1)));
-      return element("li", {}, go, remove);
+      const remove = () => (this.views = this.views.toSpliced(i, 1));
+      return element("li", {}, button(view.name, () => this.go(view.address)),
+        button("×", remove, { className: "remove", ariaLabel: `Remove ${view.name}`, title: "Remove" }));
     }));
   }
 }

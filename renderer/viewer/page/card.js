@@ -1,5 +1,5 @@
 // The card of a picked pixel: where its ray went and what it met.
-import { element, swatch } from "./element.js";
+import { button, closing, element, swatch } from "./element.js";
 import { KINDS, shownKind } from "./overlay.js";
 import { rayTree } from "./raytree.js";
 import { count } from "./readings.js";
@@ -61,15 +61,12 @@ function byLevel(levels) {
 export function showCard(card, pick, { scene, object, close, toggle, chosen, aside, shown }) {
   const list = element("dl");
   for (const [name, ...value] of rows(pick, scene, object)) list.append(element("dt", { textContent: name }), element("dd", {}, ...value));
-  const closing = element("button", { type: "button", className: "close", ariaLabel: "Close", textContent: "×" });
-  closing.addEventListener("click", close);
   const nodes = element("input", { type: "checkbox", checked: shown });
   nodes.setAttribute("role", "switch");
   nodes.addEventListener("change", () => toggle(nodes.checked));
   const visited = element("label", { className: "switch" }, element("span", {}, `${pick.visited} nodes visited`), nodes);
   const tested = element("p", { className: "note", textContent: `${count(pick.tested.triangles)} triangles tested by the camera ray` });
-  const side = element("button", { type: "button", textContent: "View from the side" });
-  side.addEventListener("click", () => aside());
+  const side = button("View from the side", () => aside());
   const title = element("h2", { textContent: pick.hit ? "Ray" : "Ray into the open" });
   const proof = pick.proof ? values(pick.proof) : [];
   const acts = object?.buttons.length ? [element("div", { className: "buttons" }, ...object.buttons)] : [];
@@ -77,6 +74,6 @@ export function showCard(card, pick, { scene, object, close, toggle, chosen, asi
   const nodesByLevel = pick.levels.length ? [byLevel(pick.levels)] : [];
   // Of a ray into the open there is little to say.
   const parts = pick.hit ? [...acts, ...rays, visited, ...nodesByLevel, tested, ...(aside ? [side] : [])] : [visited];
-  card.replaceChildren(closing, ...proof, title, list, ...parts);
+  card.replaceChildren(closing("Close", close), ...proof, title, list, ...parts);
   card.hidden = false;
 }

@@ -1,5 +1,5 @@
 // Materials, lights and surroundings as the user changes them: their lists in the panel, and what differs from the file.
-import { element, swatch } from "./element.js";
+import { button, element, swatch } from "./element.js";
 import { numberField, pickerColor, vectorField } from "./fields.js";
 import { MAX_LIGHTS } from "./model.js";
 import { Surroundings } from "./surroundings.js";
@@ -124,7 +124,7 @@ export class Edits {
     const before = this.entries ?? new Map();
     const { lights } = this.now;
     this.entries = new Map(lights.map((fields, i) => [fields, this.light(fields, i, fields === added || before.get(fields)?.open)]));
-    const add = (type) => this.button(`Add ${type} light`, () => this.addLight(type));
+    const add = (type) => button(`Add ${type} light`, () => this.addLight(type));
     const dark = lights.length - (MAX_LIGHTS - this.around.skylights.length);
     const note = element("p", { className: "note", hidden: dark <= 0, textContent: `Preview draws the first ${lights.length - dark} of these.` });
     this.lists.lights.replaceChildren(...this.entries.values(), note, element("div", { className: "buttons" }, add("directional"), add("point")));
@@ -143,12 +143,6 @@ export class Edits {
       const { irradiance, intensity } = this.now.lights[i];
       entry.querySelector(".swatch").style.background = pickerColor(irradiance ?? intensity);
     });
-  }
-
-  button(text, act, className = "") {
-    const made = element("button", { type: "button", textContent: text, className });
-    made.addEventListener("click", act);
-    return made;
   }
 
   entry(title, type, name, open, ...children) {
@@ -184,7 +178,7 @@ export class Edits {
       this.left.set(key(fields.type), fields);
       put(this.left.get(key(type.value)) ?? this.fresh(type.value));
     });
-    const undo = this.button("As in the file", () => put(copy(this.own.materials[name])), "undo");
+    const undo = button("As in the file", () => put(copy(this.own.materials[name])), { className: "undo" });
     return this.entry(name, fields.type, name, open, element("label", { className: "row" }, element("span", { textContent: "type" }), type),
       ...this.controls(fields, MATERIALS), undo);
   }
@@ -196,7 +190,7 @@ export class Edits {
   }
 
   light(fields, i, open = false) {
-    const remove = this.button("Remove", () => this.putLights(this.now.lights.filter((light) => light !== fields)));
+    const remove = button("Remove", () => this.putLights(this.now.lights.filter((light) => light !== fields)));
     return this.entry(`Light ${i + 1}`, fields.type, i, open, ...this.controls(fields, LIGHTS), remove);
   }
 

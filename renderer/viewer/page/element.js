@@ -6,6 +6,16 @@ export function element(tag, properties = {}, ...children) {
   return made;
 }
 
+// A button that says `text`; `act(event)` is called when it is pressed.
+export function button(text, act, properties = {}) {
+  const made = element("button", { type: "button", textContent: text, ...properties });
+  made.addEventListener("click", act);
+  return made;
+}
+
+// The cross in the corner of a card.
+export const closing = (label, act) => button("×", act, { className: "close", ariaLabel: label });
+
 // A dot in a colour of CSS.
 export function swatch(color) {
   const dot = element("i", { className: "swatch" });

@@ -1,4 +1,5 @@
 // Which parts of the panel are open, and whether the panel itself is: as this browser was left.
+import { read, write } from "./stored.js";
 
 const KEY = "octree-render-folds";
 // On windows less wide than this the picture has the room, until the panel is opened.
@@ -8,18 +9,9 @@ const FOUND = 2500;
 // The parts that are open at the first visit.
 const FIRST = ["fold-scene", "fold-readings"];
 
-// Some frames and private windows keep nothing.
-function kept() {
-  try {
-    return JSON.parse(localStorage.getItem(KEY)) ?? {};
-  } catch {
-    return {};
-  }
-}
-
 export class Folds {
   constructor(panel, toggle) {
-    Object.assign(this, { panel, toggle, state: kept() });
+    Object.assign(this, { panel, toggle, state: read("localStorage", KEY) ?? {} });
     for (const fold of panel.querySelectorAll("details.fold")) {
       fold.open = this.state[fold.id] ?? FIRST.includes(fold.id);
       fold.addEventListener("toggle", () => this.keep(fold.id, fold.open));
@@ -39,11 +31,7 @@ export class Folds {
 
   keep(name, open) {
     this.state[name] = open;
-    try {
-      localStorage.setItem(KEY, JSON.stringify(this.state));
-    } catch {
-      // Then the page begins folded.
-    }
+    write("localStorage", KEY, this.state); // or the page begins folded
   }
 
   // Open the panel and the parts around an entry, and let it stand out for a moment.

@@ -1,5 +1,5 @@
 // Measuring: two clicked pixels, the line between the points that they see, and its length with the bound of its error.
-import { element } from "./element.js";
+import { closing, element } from "./element.js";
 import { LineSet } from "./lines.js";
 import { clipMatrix } from "./matrix.js";
 
@@ -99,11 +99,9 @@ export class Measure {
 
   fill(distance) {
     const { points, card } = this;
-    const close = element("button", { type: "button", className: "close", ariaLabel: "End measuring", textContent: "×" });
-    close.addEventListener("click", () => this.end());
     const said = distance ? [element("p", { className: "distance", textContent: told(distance) })] : [];
     const each = distance ? " The bound holds for dx, dy and dz too." : "";
-    card.replaceChildren(close, element("h2", { textContent: "Distance" }), ...said,
+    card.replaceChildren(closing("End measuring", () => this.end()), element("h2", { textContent: "Distance" }), ...said,
       element("dl", {}, ...rows(points, distance)), element("p", { className: "note", textContent: STEPS[points.length] + each }));
   }
 

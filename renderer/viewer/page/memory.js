@@ -1,23 +1,11 @@
 // What a tab keeps when its page is loaded again: which scene it shows, and from where.
+import { read, write } from "./stored.js";
 
 const KEY = "octree-render";
 
-// Some frames and private windows keep nothing.
-export function remember(kept) {
-  try {
-    sessionStorage.setItem(KEY, JSON.stringify(kept));
-  } catch {
-    // Then the page begins anew.
-  }
-}
-
-export function remembered() {
-  try {
-    return JSON.parse(sessionStorage.getItem(KEY));
-  } catch {
-    return null;
-  }
-}
+// Where it cannot be kept the page begins anew.
+export const remember = (kept) => write("sessionStorage", KEY, kept);
+export const remembered = () => read("sessionStorage", KEY);
 
 // Whether a page goes on with the same scene of the same server.
 export const continues = (before, scene) => before?.name === scene.name && before.server === scene.server;

@@ -1,5 +1,5 @@
 // The object that a picked ray met: its name on the card, and what can be done with it from there.
-import { element } from "./element.js";
+import { button } from "./element.js";
 
 // The least share of the picture that an object is fitted into where a card covers the rest.
 const LEAST = 0.25;
@@ -9,12 +9,6 @@ export const HIDDEN = "Hidden:";
 
 // Whether a button was pressed by a key, whose user goes on from where the focus is.
 const byKey = (event) => event.detail === 0;
-
-function button(text, title, act) {
-  const made = element("button", { type: "button", textContent: text, title });
-  made.addEventListener("click", act);
-  return made;
-}
 
 export class ObjectCard {
   constructor(viewer) {
@@ -35,19 +29,19 @@ export class ObjectCard {
     const { material } = pick, { objects } = this.viewer.scene, object = this.objectOf(pick);
     if (!object) return null;
     const buttons = [
-      button("Material", `Show ${material} in the panel`, (event) => this.showMaterial(material, byKey(event))),
-      button("Frame", "All of the object in view", () => this.frame(object)),
+      button("Material", (event) => this.showMaterial(material, byKey(event)), { title: `Show ${material} in the panel` }),
+      button("Frame", () => this.frame(object), { title: "All of the object in view" }),
     ];
     return { label: object.label, buttons: objects.length > 1 ? [...buttons, ...this.hiding(object, objects)] : buttons };
   }
 
   hiding(object, objects) {
     const alone = objects.every((one) => one.shown === (one === object));
-    const hide = button("Hide", "Leave the object out", () => this.hide(object));
+    const hide = button("Hide", () => this.hide(object), { title: "Leave the object out" });
     hide.disabled = alone; // one is left to be seen
     const others = objects.filter((one) => one !== object).map(({ name }) => name);
-    const isolate = button("Isolate", alone ? "Show all objects" : "Hide all other objects", (event) =>
-      this.isolate(alone ? [] : others, byKey(event)));
+    const isolate = button("Isolate", (event) => this.isolate(alone ? [] : others, byKey(event)),
+      { title: alone ? "Show all objects" : "Hide all other objects" });
     isolate.setAttribute("aria-pressed", String(alone));
     // The card comes anew with the other scene.
     if (this.returning && this.returning === this.viewer.picking.asked) queueMicrotask(() => isolate.focus());

@@ -1,5 +1,5 @@
 // The rays of a picked pixel, one below the other: what each is, what it weighs and brings, and what it met.
-import { element, swatch } from "./element.js";
+import { button, element, swatch } from "./element.js";
 import { KINDS, shownKind } from "./overlay.js";
 
 // More rows than anyone reads.
@@ -32,10 +32,8 @@ export function rayTree(path, chosen) {
     chosen(index);
   }
   const step = (by) => () => choose(Math.min(Math.max(current + by, 0), shown.length - 1));
-  const back = element("button", { type: "button", textContent: "‹", ariaLabel: "Previous ray" });
-  const on = element("button", { type: "button", textContent: "›", ariaLabel: "Next ray" });
-  back.addEventListener("click", step(-1));
-  on.addEventListener("click", step(1));
+  const back = button("‹", step(-1), { ariaLabel: "Previous ray" });
+  const on = button("›", step(1), { ariaLabel: "Next ray" });
   list.addEventListener("pointerleave", () => !list.contains(document.activeElement) && choose(-1));
   choose(-1);
   return [element("div", { className: "steps" }, back, told, on), list];
@@ -43,11 +41,11 @@ export function rayTree(path, chosen) {
 
 function row(segment, choose) {
   const kind = shownKind(segment);
-  const button = element("button", { type: "button" },
+  const made = element("button", { type: "button" },
     swatch(`rgb(${KINDS[kind].join(" ")})`), element("span", {}, NAMES[kind]), element("span", { className: "note" }, met(segment)),
     element("span", { className: "weight" }, percent(segment.weight)), swatch(`rgb(${segment.radiance.map(srgb).join(" ")})`));
-  button.style.paddingLeft = `${6 + 12 * Math.min(segment.depth + (segment.kind === "shadow"), 8)}px`;
-  button.title = `depth ${segment.depth}; weight ${segment.weight.map((x) => x.toPrecision(3)).join("  ")}; ${brings(segment.radiance)}`;
-  for (const name of ["pointerenter", "focus", "click"]) button.addEventListener(name, choose);
-  return button;
+  made.style.paddingLeft = `${6 + 12 * Math.min(segment.depth + (segment.kind === "shadow"), 8)}px`;
+  made.title = `depth ${segment.depth}; weight ${segment.weight.map((x) => x.toPrecision(3)).join("  ")}; ${brings(segment.radiance)}`;
+  for (const name of ["pointerenter", "focus", "click"]) made.addEventListener(name, choose);
+  return made;
 }

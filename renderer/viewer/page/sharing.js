@@ -1,5 +1,5 @@
 // The panel's section of files to hand on: all in one, which the page makes by itself, and pictures by the server.
-import { element } from "./element.js";
+import { button, element } from "./element.js";
 import { Exports } from "./exports.js";
 import { allowed } from "./film.js";
 import { Progress } from "./progress.js";
@@ -24,12 +24,6 @@ function select(id, label, options, chosen) {
   return made;
 }
 
-function button(id, text, title, act) {
-  const made = element("button", { type: "button", id, title, textContent: text });
-  made.addEventListener("click", act);
-  return made;
-}
-
 export class Sharing {
   constructor(viewer, section) {
     this.viewer = viewer;
@@ -39,10 +33,10 @@ export class Sharing {
       shown: (done) => this.showProgress(done),
       made: (blob, name) => this.saved(blob, name, this.note),
     });
-    this.file = button("share-file", "Save as one file", "Picture, model, boxes and ray as an HTML page that needs no server",
-      () => this.saveFile());
-    this.still = button("export-still", "Save picture", "Rendered in this size while the view stays", () => this.askStill());
-    this.turntable = button("export-turntable", "Save turntable", "Once around what the camera turns about", () => this.askTurntable());
+    this.file = button("Save as one file", () => this.saveFile(),
+      { id: "share-file", title: "Picture, model, boxes and ray as an HTML page that needs no server" });
+    this.still = button("Save picture", () => this.askStill(), { id: "export-still", title: "Rendered in this size while the view stays" });
+    this.turntable = button("Save turntable", () => this.askTurntable(), { id: "export-turntable", title: "Once around what the camera turns about" });
     this.size = select("still-size", "Size of the picture", SIZES, "3840x2160");
     this.stillFormat = select("still-format", "Format of the picture", STILLS, "png");
     this.height = select("turntable-height", "Size of the turntable", HEIGHTS, "480");
@@ -50,7 +44,7 @@ export class Sharing {
     this.format = select("turntable-format", "Format of the turntable", FORMATS, "webp");
     const bar = element("div", { className: "exporting", id: "exporting", hidden: true },
       element("progress", { max: 1, ariaLabel: "File" }), element("output"),
-      button("stop-export", "Cancel", "", () => this.exports.stop()));
+      button("Cancel", () => this.exports.stop(), { id: "stop-export" }));
     this.progress = new Progress(bar);
     section.append(element("summary", {}, element("h2", { textContent: "Share" })), this.file,
       element("div", { className: "choices stills" }, this.size, this.stillFormat), this.still,

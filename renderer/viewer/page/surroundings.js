@@ -1,5 +1,5 @@
 // What is around the scene, as the user changes it: ambient light, and a background or a sky in its place.
-import { element } from "./element.js";
+import { button, element } from "./element.js";
 import { numberField, vectorField } from "./fields.js";
 import { raised } from "./matrix.js";
 import { skylights } from "./skylights.js";
@@ -48,12 +48,12 @@ export class Surroundings {
       sun: this.switch("Sun", (on) => this.putPart("sun", on ? this.left.sun : undefined)),
     };
     this.parts = Object.fromEntries(["ambient", "plain", "strength", "tints", "ground", "lights", "sun"].map((name) => [name, element("div")]));
-    this.undo = element("button", { type: "button", textContent: "As in the file", className: "undo" });
-    this.undo.addEventListener("click", () => {
+    const undone = () => {
       this.now = copy(this.own);
       this.show();
       this.changed();
-    });
+    };
+    this.undo = button("As in the file", undone, { className: "undo" });
     const { ambient, plain, strength: strong, tints, ground, lights, sun } = this.parts, { switches } = this;
     this.ofSky = element("div", {}, strong, tints, switches.ground.row, ground, lights, switches.sun.row, sun);
     section.replaceChildren(ambient, switches.sky.row, plain, this.ofSky, this.undo);
