@@ -196,6 +196,7 @@ class Viewer:
                 viewer.camera.reset();
                 viewer.layout();
                 viewer.setMode("octree");
+                viewer.past.write();
             }"""
         )
         self.settled("octree")

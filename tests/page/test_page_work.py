@@ -499,6 +499,14 @@ def test_the_sun_turns_about_the_axis_that_is_up(browser: Any, tmp_path: Path) -
         np.testing.assert_allclose(found, light.direction, atol=1e-12)
 
 
+def test_a_change_right_after_the_page_opened_is_undone(browser: Any, url: str) -> None:
+    with Viewer(browser, url) as page:
+        page.page.goto(url)
+        page.page.wait_for_function("() => window.viewer?.scene && (viewer.look([0, 0, 1]), 1)")
+        page.page.wait_for_function("() => viewer.past.timer === null")
+        assert page.page.is_enabled("#undo")
+
+
 def test_each_change_is_undone_and_done_again(browser: Any, url: str) -> None:
     """A drag is one step, an edit another; the browser's Back is Undo, and the first view is the end of it."""
     with Viewer(browser, url) as page:

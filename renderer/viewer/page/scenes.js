@@ -83,6 +83,7 @@ export class Scenes {
     if (TRACED.includes(viewer.mode)) viewer.busy.begin("tracing", "Tracing the first picture …");
     if (scene.faces <= MANY_FACES) this.loadMesh();
     this.tryBoxes();
+    if (!this.asked) viewer.past.write(); // what is changed next is a step of its own
   }
 
   // Nothing of the scene before is shown any more, nor taken when it comes.
