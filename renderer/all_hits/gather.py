@@ -13,14 +13,15 @@ from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import is_negative, load, lowest_bit, minimum, offset, pointer, store
 from renderer.trace.best import NO_FACE, Best
 from renderer.trace.edge_signs import coordinate, exact_sides
-from renderer.trace.intersect import hit_in, hit_triangles, make_shear
+from renderer.trace.intersect import face_in, hit_in, hit_triangles, make_shear
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
-from renderer.trace.leaf import resolved_hit, tree_pointers
+from renderer.trace.leaf import resolved_hit
 from renderer.trace.rays import HitPointers, first_bad_ray, ray_at, ray_pointers, write_hit
 from renderer.trace.single_ray import SingleRay, enter_node, prepare_single
 from renderer.trace.starts.record import PILE, StartPointers
 from renderer.trace.starts.search import Departure, counted_from_start, depart, meet_near, near_bits, stopped_again
 from renderer.trace.traverse import scratch_pointers
+from renderer.trace.trees import tree_pointers
 from renderer.trace.walk import walk
 
 # Rows of a chunk's memory, each of its capacity. Of the hits of the ray under way: t, u, v, w as float64; face, the
@@ -155,7 +156,7 @@ def _add_hit(tree, query, count, hit, block, i, edges):
     if not query.single.ray.t_min <= hit.t <= query.t_max:
         return count
     if count < found.capacity:
-        face = np.int64(load(tree.faces, block * BLOCK_FACES + i))
+        face = np.int64(face_in(tree, block * BLOCK_FACES + i))
         _list_hit(found, count, face, hit, block * BLOCK_WORDS + i, edges)
     return count + 1
 
@@ -202,7 +203,7 @@ def _list_hits_from(tree, query, first, blocks, count):
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
-            face = load(tree.faces, block * BLOCK_FACES + i)
+            face = face_in(tree, block * BLOCK_FACES + i)
             if np.float64(face) == ray.leaving:
                 continue
             if (near >> i) & 1 != 0:

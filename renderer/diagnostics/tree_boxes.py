@@ -19,7 +19,8 @@ from renderer.trace.batch import check_rays
 from renderer.trace.best import NO_FACE, FaceHit, hit_on
 from renderer.trace.intersect import Ray, box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
 from renderer.trace.layout import CHILDREN, NODE_WORDS, Tree
-from renderer.trace.leaf import nearest_carefully, tree_pointers
+from renderer.trace.leaf import nearest_carefully
+from renderer.trace.trees import tree_pointers
 from renderer.trace.walk import blocks_of
 
 Boxes = NDArray[np.float64]

@@ -28,11 +28,12 @@ from renderer.numerics.simd import (
 from renderer.numerics.vec3 import three
 from renderer.trace.best import NO_FACE
 from renderer.trace.edge_signs import corner
-from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
-from renderer.trace.leaf import tree_pointers
+from renderer.trace.intersect import face_in
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.point import Point
 from renderer.trace.rays import hit_pointers
-from renderer.trace.walk import child_in, walk_nearest_first
+from renderer.trace.trees import tree_pointers
+from renderer.trace.walk import boxes_of, child_in, walk_nearest_first
 
 # In place of a face: float64 cannot decide.
 UNDECIDED_FACE = -2
@@ -173,9 +174,8 @@ def _reaches(query, k, found):
 
 @inlined
 def _enter(tree, query, node, found, top):
-    bits = _bound_boxes(
-        tree.nodes, node * NODE_WORDS, query.point, splat4(_squared(found.limit)), query.scratch.squares
-    )  # fmt: skip
+    nodes, base = boxes_of(tree, node)
+    bits = _bound_boxes(nodes, base, query.point, splat4(_squared(found.limit)), query.scratch.squares)
     return found, _push_nearest_last(tree, node, bits, query.scratch, top)
 
 
@@ -268,7 +268,7 @@ def _settle(tree, query, found):
         place = load(scratch.places, k)
         store(scratch.work, 0, load(scratch.work, 0) + _MEASURE)
         base = (place // BLOCK_FACES) * BLOCK_WORDS + place % BLOCK_FACES
-        f = load(tree.faces, place)
+        f = face_in(tree, place)
         a, b, c = corner(tree, base), corner(tree, base + 12), corner(tree, base + 24)
         d, u, v = distance_to_face(a, b, c, p, scratch.parts)
         # rule: equally-near

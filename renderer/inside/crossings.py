@@ -29,10 +29,10 @@ from renderer.numerics.simd import (
     store,
 )
 from renderer.trace.edge_signs import coordinate
-from renderer.trace.intersect import load_corners, round_down, round_up
-from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
-from renderer.trace.leaf import tree_pointers
-from renderer.trace.walk import walk
+from renderer.trace.intersect import face_in, load_corners, round_down, round_up
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
+from renderer.trace.trees import tree_pointers
+from renderer.trace.walk import boxes_of, walk
 
 # In place of a winding number, which counts less than 2^31 faces: the point lies on a face, or float64 cannot decide.
 ON_FACE, UNDECIDED_COUNT = -(2**31), -(2**31) + 1
@@ -117,7 +117,8 @@ def _search(tree, query, stack):
 
 @inlined
 def _enter(tree, query, node, found):
-    return found, _meet_boxes(tree.nodes, node * NODE_WORDS, query.ray)
+    nodes, base = boxes_of(tree, node)
+    return found, _meet_boxes(nodes, base, query.ray)
 
 
 @inlined
@@ -150,7 +151,7 @@ def _cross_blocks(tree, query, first, count, found):
         while unsure != 0:
             i = lowest_bit(unsure)
             unsure &= unsure - 1
-            if load(tree.faces, block * BLOCK_FACES + i) >= 0:
+            if face_in(tree, block * BLOCK_FACES + i) >= 0:
                 store(parts, PARTS, load(parts, PARTS) + _EXACTLY)
                 step, touches = _cross_exactly(tree, base + i, ray, parts)
                 winding, on = winding + step, on | touches

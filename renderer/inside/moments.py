@@ -26,9 +26,9 @@ from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import extract, load, maximum, pointer, select, splat4, square_root, store
 from renderer.system.threads import for_chunks
 from renderer.trace.edge_signs import corner
-from renderer.trace.intersect import load_corners
+from renderer.trace.intersect import face_in, load_corners
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS, Tree, cache_aligned
-from renderer.trace.leaf import tree_pointers
+from renderer.trace.trees import tree_pointers
 from renderer.trace.walk import blocks_of, child_in, stack_size
 
 # Nodes per chunk: some milliseconds, but for the first chunk, whose nodes hold all faces.
@@ -257,7 +257,7 @@ def _add_faces(tree, link, centre, radius, scratch):
     first, count = blocks_of(link)
     unit = 1.0 / radius
     for place in range(first * BLOCK_FACES, (first + count) * BLOCK_FACES):
-        if load(tree.faces, place) >= 0:
+        if face_in(tree, place) >= 0:
             at = (place // BLOCK_FACES) * BLOCK_WORDS + place % BLOCK_FACES
             a, b, c = corner(tree, at), corner(tree, at + 12), corner(tree, at + 24)
             d, e = _scaled(b, a, unit), _scaled(c, a, unit)

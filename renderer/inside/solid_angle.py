@@ -14,7 +14,6 @@ from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import (
     extract,
     fabs,
-    load,
     lowest_bit,
     movemask,
     select,
@@ -22,7 +21,7 @@ from renderer.numerics.simd import (
     square_root,
 )
 from renderer.trace.edge_signs import corner
-from renderer.trace.intersect import load_corners
+from renderer.trace.intersect import face_in, load_corners
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 
 # Both parts of a face's number, at most 4 in size, err by 2^-47: corners, lengths and directions by 2^-53 of themselves
@@ -66,7 +65,7 @@ def add_blocks(tree, first, count, point, total, parts):
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
-            if load(tree.faces, block * BLOCK_FACES + i) >= 0:
+            if face_in(tree, block * BLOCK_FACES + i) >= 0:
                 apart += _careful_angle(tree, base + i, point, parts)
         total = _times(total, select(sure, rest, splat4(1.0)), select(sure, volume, splat4(0.0)))
     return Turned(total.real, total.imaginary, total.turns, apart)

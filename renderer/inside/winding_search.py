@@ -9,8 +9,8 @@ from renderer.inside.multipoles import MOMENT_WORDS, ROUNDING, see_octants, sum_
 from renderer.inside.solid_angle import Turned, add_blocks, no_turn, turns_of
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import load, local_doubles, maximum, minimum, offset, pointer, splat4
-from renderer.trace.leaf import tree_pointers
 from renderer.trace.point import Point
+from renderer.trace.trees import tree_pointers
 from renderer.trace.walk import walk
 
 # The nodes and blocks that a call sums, beside those of one point: some milliseconds, so that Ctrl-C need not wait for

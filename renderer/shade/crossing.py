@@ -13,10 +13,10 @@ from renderer.numerics.simd import load, minimum, pointer, store
 from renderer.numerics.vec3 import dot
 from renderer.shade.records import IOR
 from renderer.shade.surface import Look, left_from, lets_through, look_at, scene_pointers
-from renderer.trace.leaf import tree_pointers
 from renderer.trace.spawn import Place
 from renderer.trace.starts.cone import NUMBER, PATH, holder, make_holders, put_holder
 from renderer.trace.starts.level import NO_MEMBER, Spot, list_members, list_near, member_spot
+from renderer.trace.trees import tree_pointers
 
 # Room for media that a ray enters at one place, beside those that it remembers.
 SPARE = 8

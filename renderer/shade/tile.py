@@ -26,9 +26,9 @@ from renderer.shade.whitted import (
     trace_bundle,
 )
 from renderer.trace.layout import cache_aligned
-from renderer.trace.leaf import tree_pointers
 from renderer.trace.spawn import put_no_start
 from renderer.trace.traverse import Scratch, new_scratch, scratch_pointers
+from renderer.trace.trees import tree_pointers
 
 _BRIGHTEST = float(np.finfo(np.float32).max)
 # The side in pixels of the squares whose rays become packets.

@@ -23,9 +23,11 @@ from renderer.numerics.simd import (
 from renderer.numerics.vec3 import largest_of_three, length, sub
 from renderer.shade.surface import lets_through, scene_pointers
 from renderer.trace.edge_signs import corner
+from renderer.trace.intersect import face_in
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
-from renderer.trace.leaf import octants_around, tree_pointers
+from renderer.trace.leaf import octants_around
 from renderer.trace.starts.level import CORNER_ERROR, plane_of
+from renderer.trace.trees import tree_pointers
 from renderer.trace.walk import walk
 
 # The share of a face's coordinates by which its box grows.
@@ -41,7 +43,7 @@ def mark_touching(descriptor, arrays, begin, end, every, stack, touching):
     """
     tree, scene = tree_pointers(descriptor), scene_pointers(arrays)
     for slot in range(begin, end):
-        face = load(tree.faces, slot)
+        face = face_in(tree, slot)
         if face >= 0 and (every or lets_through(scene.materials, np.int64(load(scene.material, face)))):
             _mark_touched(tree, slot, face, pointer(stack), pointer(touching))
 
@@ -123,7 +125,7 @@ def _mark_touched_in(tree, query, first, blocks, found):
         while bits != 0:
             slot = block * BLOCK_FACES + lowest_bit(bits)
             bits &= bits - 1
-            other = load(tree.faces, slot)
+            other = face_in(tree, slot)
             if other >= 0 and other != query.face and _may_coincide(query.flat, _corners(tree, slot)):
                 store(query.touching, query.face, np.uint8(1))
                 store(query.touching, other, np.uint8(1))

@@ -15,7 +15,6 @@ from renderer.numerics.simd import load, minimum, offset, pointer, store
 from renderer.numerics.vec3 import add, cross, dot, largest_component, least_axis, normalized, put3, row3, scale, three
 from renderer.trace.intersect import CORNER
 from renderer.trace.layout import cache_aligned
-from renderer.trace.leaf import tree_pointers
 from renderer.trace.parallel_rays import (
     ParallelPointers,
     ParallelScratch,
@@ -41,11 +40,12 @@ from renderer.trace.starts.record import (
     SLACK,
     WAY,
     StartPointers,
-    corners_of,
+    corners_in,
     start_at,
 )
 from renderer.trace.starts.search import take_side
 from renderer.trace.traverse import Scratch, ScratchPointers, new_scratch, scratch_pointers, trace_rays
+from renderer.trace.trees import tree_pointers
 
 TILE = 256
 # A tile ends where the curve leaves the largest cell, but not before so many points: else its parts may be far apart,
@@ -218,7 +218,7 @@ def _begin_on_face(tree, scratch, i, o, face, code, has_horizon):
     """Prepare where the rays of a tile's ``i``-th point start, which lies on a face; its normal says on which side."""
     start, n = offset(scratch.points, _START + ROW * i), three(scratch.points, _FRAME + 9 * i + 6)
     starts = StartPointers(start, 0, scratch.vertices, scratch.faces)
-    corners, slack = corners_of(starts.vertices, starts.faces, face, tree.scale), EDGE
+    corners, slack = corners_in(tree, starts, face), EDGE
     if has_normal(corners[0], corners[1], corners[2]):
         normal, above, below, slack = offset_to_both_sides(corners, o, tree.scale)
         put3(scratch.points, _FACING + 3 * i, normal)
@@ -238,7 +238,7 @@ def _begin_on_face(tree, scratch, i, o, face, code, has_horizon):
 def _begin_on_edge(tree, starts, scratch, i, n, has_horizon):
     """``_begin_on_face`` for a point on or near an edge."""
     begin = load(scratch.numbers, _TABLES)
-    anchor = anchor_of(start_at(starts, 0, tree.scale))
+    anchor = anchor_of(start_at(tree, starts, 0))
     store(scratch.numbers, _CORNER + i, np.int64(anchor.zeros & (anchor.zeros - 1) != 0))
     put3(scratch.points, _ABOVE + 3 * i, scale(rounded(anchor), 1.0 / tree.scale))
     store(scratch.numbers, _TABLE + i, -1)

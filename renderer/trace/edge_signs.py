@@ -21,6 +21,12 @@ _FRACTION_BITS, _BIAS = 52, 1023
 @inlined
 def coordinate(tree, at):
     """One coordinate of a block, exactly."""
+    return tree.ways.coordinate(tree, at)
+
+
+@inlined
+def coordinate_of_block(tree, at):
+    """``coordinate`` of a mesh."""
     return load(tree.wide_blocks, at) if tree.wide != 0 else np.float64(load(tree.blocks, at))
 
 

@@ -26,7 +26,7 @@ from renderer.numerics.simd import (
     widen,
 )
 from renderer.trace.best import FaceHit
-from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, NODE_WORDS
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 
 # (1 + 2 gamma(3)) in float32, rounded up: the far side of a slab after one subtraction, one product and one rounded
 # reciprocal, against a near side that erred the other way (Ize, Robust BVH Ray Traversal, JCGT 2:2, 2013, sec. 3).
@@ -204,20 +204,20 @@ def make_slabs(ray, largest):
 
 
 @inlined
-def enter_boxes(nodes, node, slabs, lower, upper):
+def enter_boxes(nodes, base, slabs, lower, upper):
     """``meet_boxes`` with the bits of the octants in place of the mask."""
-    t0, meets = meet_boxes(nodes, node, slabs, lower, upper)
+    t0, meets = meet_boxes(nodes, base, slabs, lower, upper)
     return t0, movemask(meets)
 
 
 @inlined
-def meet_boxes(nodes, node, slabs, lower, upper):
-    """Entry distances (8 x float32), and the mask of the octants that the ray enters within [lower, upper].
+def meet_boxes(nodes, base, slabs, lower, upper):
+    """Entry distances (8 x float32), and the mask of the octants that the ray enters within [lower, upper]; their rows
+    begin at ``base``.
 
     A distance is NaN where the direction is 0 and the origin lies in a slab's plane. Each comparison is false for NaN,
     so the interval stays as it was.
     """
-    base = node * NODE_WORDS
     n = _distances(nodes, base + slabs.near_x, slabs.near_origin_x, slabs.near_inverse_x)
     t0 = select(n > lower, n, lower)
     n = _distances(nodes, base + slabs.near_y, slabs.near_origin_y, slabs.near_inverse_y)
@@ -317,6 +317,12 @@ class Edges(NamedTuple):
 @inlined
 def load_corners(tree, base, rows):
     """The nine rows of a block: x, y and z of each corner, in the order of axes row_x, row_y, row_z of ``rows``."""
+    return tree.ways.corners(tree, base, rows)
+
+
+@inlined
+def corners_of_block(tree, base, rows):
+    """``load_corners`` of a mesh."""
     return _load_rows(tree.wide_blocks, base, rows) if tree.wide != 0 else _load_rows(tree.blocks, base, rows)
 
 
@@ -328,6 +334,18 @@ def _load_rows(blocks, base, rows):
         load4(blocks, y), load4(blocks, y + 12), load4(blocks, y + 24),
         load4(blocks, z), load4(blocks, z + 12), load4(blocks, z + 24),
     )  # fmt: skip
+
+
+@inlined
+def face_in(tree, slot):
+    """The number of the face in a slot, -1 for none."""
+    return tree.ways.face(tree, slot)
+
+
+@inlined
+def face_of_block(tree, slot):
+    """``face_in`` of a mesh."""
+    return load(tree.faces, slot)
 
 
 @inlined
@@ -433,7 +451,7 @@ def _left(tree, base, edges, ray):
     """
     slot, bits = base // BLOCK_WORDS * BLOCK_FACES, np.int64(0)
     for i in range(BLOCK_FACES):
-        bits |= np.int64(np.float64(load(tree.faces, slot + i)) == ray.leaving) << i
+        bits |= np.int64(np.float64(face_in(tree, slot + i)) == ray.leaving) << i
     if ray.slack == CORNER:
         zero = splat4(0.0)
         at0 = (edges.x0 == zero) & (edges.y0 == zero) & (edges.z0 == zero)

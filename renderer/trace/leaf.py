@@ -1,84 +1,34 @@
 """The triangles of a leaf's blocks, or of all blocks, against one ray."""
 
-from typing import Any, NamedTuple
-
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import (
-    double_of,
     extract,
-    float32_pointer,
-    float64_pointer,
-    int32_pointer,
-    load,
     load8,
     lowest_bit,
     minimum,
     movemask,
-    pointer,
     splat8,
 )
 from renderer.trace.best import NO_FACE, Best, hit_on, is_better, no_hit
-from renderer.trace.intersect import hit_in, hit_triangles, make_shear, room_of, round_both
+from renderer.trace.intersect import face_in, hit_in, hit_triangles, make_shear, room_of, round_both
 from renderer.trace.layout import (
-    BLOCK_COUNT,
     BLOCK_FACES,
     BLOCK_WORDS,
-    BLOCKS,
-    DEPTH,
-    FACES,
-    NODE_WORDS,
-    NODES,
-    SCALE,
-    WIDE,
 )
 from renderer.trace.resolve import resolve_uncertain
-
-
-class TreePointers(NamedTuple):
-    """A ``Tree`` as the traversal reads it.
-
-    ``blocks`` and ``wide_blocks`` point to the same memory: float64 where ``wide`` is 1, float32 where it is 0.
-    """
-
-    nodes: Any
-    links: Any
-    blocks: Any
-    wide_blocks: Any
-    wide: Any
-    faces: Any
-    count: int  # type: ignore[assignment]  # tuples have a method of that name
-    has_nodes: bool
-    scale: float
-
-
-@inlined
-def tree_pointers(descriptor):
-    """The pointers in ``Tree.descriptor``, whose tree the caller must keep alive."""
-    at = pointer(descriptor)
-    nodes, blocks = load(at, NODES), load(at, BLOCKS)
-    return TreePointers(
-        float32_pointer(nodes),
-        int32_pointer(nodes),
-        float32_pointer(blocks),
-        float64_pointer(blocks),
-        load(at, WIDE),
-        int32_pointer(load(at, FACES)),
-        load(at, BLOCK_COUNT),
-        load(at, DEPTH) > 0,
-        double_of(load(at, SCALE)),
-    )
+from renderer.trace.walk import boxes_of
 
 
 @inlined
 def octants_around(tree, node, low, high):
     """The bits of the octants of a node whose boxes overlap the box from ``low`` to ``high``."""
-    base, bits, room = node * NODE_WORDS, 0xFF, room_of(0.0)
+    (nodes, base), bits, room = boxes_of(tree, node), 0xFF, room_of(0.0)
     for k in range(3):
         down, up = round_both(low[k], room)[0], round_both(high[k], room)[1]
         bits &= movemask(
-            (load8(tree.nodes, base + 16 * k) <= splat8(up)) & (load8(tree.nodes, base + 16 * k + 8) >= splat8(down))
+            (load8(nodes, base + 16 * k) <= splat8(up)) & (load8(nodes, base + 16 * k + 8) >= splat8(down))
         )
     return bits
 
@@ -103,7 +53,7 @@ def nearest_in_blocks(tree, first, count, t_min, shear, best):
             i = lowest_bit(bits)
             bits &= bits - 1
             ti = extract(hits.t, i)
-            fi = load(tree.faces, block * BLOCK_FACES + i)
+            fi = face_in(tree, block * BLOCK_FACES + i)
             # rule: tie-in-blocks
             if ti >= t_min and (ti < t or (ti == t and fi < face)):
                 t, face, u, v, w = ti, fi, extract(hits.u, i), extract(hits.v, i), extract(hits.w, i)
@@ -119,7 +69,7 @@ def nearest_carefully(tree, first, count, ray, shear, best):
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
-            face, hit = load(tree.faces, block * BLOCK_FACES + i), resolved_hit(tree, block, hits, i, ray, shear)
+            face, hit = face_in(tree, block * BLOCK_FACES + i), resolved_hit(tree, block, hits, i, ray, shear)
             if is_better(hit.t, face, ray.t_min, best):
                 best = hit_on(face, hit)
     return best

@@ -6,11 +6,12 @@ from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import LOCAL_WORDS, is_negative, load, local_words, offset, pointer, store
 from renderer.trace.best import NO_FACE, Best, no_hit
 from renderer.trace.intersect import largest_of, make_shear
-from renderer.trace.leaf import nearest_carefully, tree_pointers
+from renderer.trace.leaf import nearest_carefully
 from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers, write_hit
 from renderer.trace.single_ray import Found, enter_counted, prepare_single
 from renderer.trace.starts.record import PILE
 from renderer.trace.starts.search import is_near_start, search_from, t_from
+from renderer.trace.trees import tree_pointers
 from renderer.trace.walk import stack_size, walk
 
 # The levels of the deepest tree whose stack fits into a kernel's own frame.

@@ -16,6 +16,7 @@ from renderer.trace.intersect import (
     make_slabs,
     round_down,
 )
+from renderer.trace.layout import NODE_WORDS
 
 
 class SingleRay(NamedTuple):
@@ -49,7 +50,13 @@ def prepare_single(ray):
 @inlined
 def enter_node(tree, node, single, t_max):
     """The entry distances of a node's octants, and the bits of those that a ray enters up to ``t_max``."""
-    return enter_boxes(tree.nodes, node, single.slabs, single.lower, splat8(box_limit(t_max, single.largest)))
+    return tree.ways.enter(tree, node, single, splat8(box_limit(t_max, single.largest)))
+
+
+@inlined
+def enter_node_of_tree(tree, node, single, upper):
+    """``enter_node`` of a mesh, up to the distance ``upper``."""
+    return enter_boxes(tree.nodes, node * NODE_WORDS, single.slabs, single.lower, upper)
 
 
 @inlined

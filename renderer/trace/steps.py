@@ -11,12 +11,13 @@ from renderer.results.steps import Steps
 from renderer.system.threads import for_chunks
 from renderer.trace.batch import CHUNK, RayBatch, reject
 from renderer.trace.best import Best, no_hit
-from renderer.trace.intersect import box_limit
+from renderer.trace.intersect import box_limit, face_in
 from renderer.trace.layout import BLOCK_FACES, Tree
-from renderer.trace.leaf import nearest_carefully, tree_pointers
+from renderer.trace.leaf import nearest_carefully
 from renderer.trace.rays import first_bad_ray, ray_at, ray_pointers
 from renderer.trace.single_ray import SingleRay, enter_node, prepare_single
 from renderer.trace.stack_entry import order_of
+from renderer.trace.trees import tree_pointers
 from renderer.trace.walk import child_in, stack_size, walk_nearest_first
 
 # The nodes and triangles that a call tests, beside those of one ray: some milliseconds, so that Ctrl-C need not wait
@@ -125,7 +126,7 @@ def _visit(tree, query, first, count, found):
 def _faces_in(tree, first, count):
     faces = np.int64(0)
     for place in range(first * BLOCK_FACES, (first + count) * BLOCK_FACES):
-        faces += np.int64(load(tree.faces, place) >= 0)
+        faces += np.int64(face_in(tree, place) >= 0)
     return faces
 
 

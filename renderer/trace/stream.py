@@ -25,7 +25,7 @@ from renderer.numerics.simd import (
     store,
 )
 from renderer.trace.best import Best
-from renderer.trace.intersect import box_limit, meet_boxes, meet_planes, see_triangles
+from renderer.trace.intersect import box_limit, face_in, meet_boxes, meet_planes, see_triangles
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CACHE_LINE, CHILDREN, MAX_LEAF_BLOCKS, NODE_WORDS
 from renderer.trace.ray_lanes import (
     CHILD,
@@ -135,7 +135,7 @@ def clear_lanes(lanes):
 
 
 @inlined
-def begin_rays(rays, prepared, lanes, queue, counts):
+def begin_rays(tree, rays, prepared, lanes, queue, counts):
     """Begin rays of a queue, eight at a time, while few are under way and lanes are free.
 
     Returns the first ray that still waits, and the ``LaneCounts``.
@@ -149,15 +149,16 @@ def begin_rays(rays, prepared, lanes, queue, counts):
         prepare_eight(rays, prepared, r, offset(queue.numbers, following))
         store(lanes.left, half, some)
         for k in range(some):
-            begin_ray(prepared, lanes, r + k, load(queue.numbers, following + k))
+            begin_ray(tree, rays, prepared, lanes, r + k, load(queue.numbers, following + k))
             store(lanes.at_node, nodes + k, r + k)
         following, nodes = following + some, nodes + some
     return following, LaneCounts(nodes, counts.leaves, counts.ends)
 
 
 @inlined
-def begin_ray(prepared, lanes, r, number):
+def begin_ray(tree, rays, prepared, lanes, r, number):
     """Start the prepared ray in lane ``r`` at the root."""
+    tree.ways.begin(rays, prepared, r, number)
     integers, bottom = prepared.integers, stack_of(lanes, r)
     store(integers, CHILD + r, 0)
     store(integers, TOP + r, bottom + 1)
@@ -197,16 +198,33 @@ def meet_nodes(tree, rays, lanes, count):
     """
     for k in range(count):
         r = load(lanes.at_node, k)
-        node, top = load(rays.integers, CHILD + r), load(rays.integers, TOP + r)
+        top, (nodes, links, base) = load(rays.integers, TOP + r), tree.ways.node_of(tree, rays, r)
         lower, upper = splat8(load(rays.floats, LOWER + r)), splat8(load(rays.floats, LIMIT + r))
-        t0, meets = meet_boxes(tree.nodes, node, slabs_of(rays, r), lower, upper)
-        store(lanes.stacks, top, farthest_first(meets, t0, tree.links, node * NODE_WORDS + CHILDREN))
+        t0, meets = meet_boxes(nodes, base, slabs_of(rays, r), lower, upper)
+        store(lanes.stacks, top, farthest_first(meets, t0, links, base + CHILDREN))
         store(rays.integers, TOP + r, top + count_bits(movemask(meets)))
 
 
 @inlined
-def resume(tree, rays, lanes, r):
+def begin_in_tree(rays, prepared, r, number):
+    """``Ways.begin`` of a mesh."""
+
+
+@inlined
+def node_in_tree(tree, prepared, r):
+    """``Ways.node_of`` a mesh."""
+    return tree.nodes, tree.links, load(prepared.integers, CHILD + r) * NODE_WORDS
+
+
+@inlined
+def resume(tree, rays, prepared, lanes, r):
     """Pop the next child of ray ``r`` that is not beyond its best hit, and return it."""
+    return tree.ways.resume(tree, rays, prepared, lanes, r)
+
+
+@inlined
+def resume_in_tree(tree, sources, rays, lanes, r):
+    """``resume`` in a mesh."""
     # rule: resume-limit
     limit, top = load(rays.floats, LIMIT + r), load(rays.integers, TOP + r) - 1
     entry = load(lanes.stacks, top)
@@ -254,7 +272,7 @@ def take_hits(tree, rays, lanes, k):
     while bits != 0:
         i = lowest_bit(bits)
         bits &= bits - 1
-        ti, fi = load(hits, i), load(tree.faces, block * BLOCK_FACES + i)
+        ti, fi = load(hits, i), face_in(tree, block * BLOCK_FACES + i)
         # rule: tie-in-streams
         if ti < t or (ti == t and fi < face):
             t, face = ti, fi
@@ -265,7 +283,7 @@ def take_hits(tree, rays, lanes, k):
 
 
 @inlined
-def leave_leaf(tree, rays, lanes, r):
+def leave_leaf(tree, sources, rays, lanes, r):
     """Choose the next child of ray ``r`` at a leaf: the rest of its blocks, else one from its stack. Returns it."""
     child = load(rays.integers, CHILD + r)
     # rule: rest-of-leaf
@@ -274,7 +292,7 @@ def leave_leaf(tree, rays, lanes, r):
         child -= MAX_LEAF_BLOCKS - 1
         store(rays.integers, CHILD + r, child)
         return child
-    return resume(tree, rays, lanes, r)
+    return resume(tree, sources, rays, lanes, r)
 
 
 @inlined
@@ -307,7 +325,7 @@ def run_lanes(tree, rays, prepared, lanes, counts, queue, most_rounds, query, me
     while True:
         if following < queue.count and rounds <= most_rounds:
             waiting = Queue(queue.numbers, following, queue.count)
-            following, counts = begin_rays(rays, prepared, lanes, waiting, counts)
+            following, counts = begin_rays(tree, rays, prepared, lanes, waiting, counts)
         if counts.nodes + counts.leaves + counts.ends == 0:
             return following, rounds
         rounds += 1
@@ -316,13 +334,13 @@ def run_lanes(tree, rays, prepared, lanes, counts, queue, most_rounds, query, me
         meet_nodes(tree, prepared, lanes, entered)
         for k in range(entered):
             r = load(lanes.at_node, k)
-            counts = list_lane(lanes, r, resume(tree, prepared, lanes, r), counts)
+            counts = list_lane(lanes, r, resume(tree, rays, prepared, lanes, r), counts)
         # Take the rays at leaves one block on.
         entered, counts = counts.leaves, LaneCounts(counts.nodes, np.int64(0), counts.ends)
         meet(tree, query, lanes, entered)
         for k in range(entered):
             r, ends = load(lanes.at_leaf, k), take(tree, query, k)
-            counts = list_lane(lanes, r, END if ends else leave_leaf(tree, prepared, lanes, r), counts)
+            counts = list_lane(lanes, r, END if ends else leave_leaf(tree, rays, prepared, lanes, r), counts)
         for k in range(counts.ends):
             r = load(lanes.at_end, k)
             rounds += finish(tree, query, r)

@@ -10,7 +10,7 @@ from renderer.numerics.simd import load, lowest_bit, minimum, offset, pointer, s
 from renderer.trace.best import NO_FACE, no_hit
 from renderer.trace.intersect import largest_of, make_shear
 from renderer.trace.layout import cache_aligned
-from renderer.trace.leaf import search_all_blocks, tree_pointers
+from renderer.trace.leaf import search_all_blocks
 from renderer.trace.packet import child_of, meet_octant, trace_packet
 from renderer.trace.ray_lanes import (
     DIRECTION_Z,
@@ -48,11 +48,9 @@ from renderer.trace.stream import (
     take_hits,
     wait_octant,
 )
+from renderer.trace.trees import tree_pointers
 from renderer.trace.walk import stack_size
 
-# Sixteen rays are no packet when a slope against their dominant axis differs by more than this from the first ray's.
-# The bound only spares scattered rays the attempt; a packet whose rays part later ends by its BUDGET.
-_SPREAD = 0.125
 # The rounds of lanes in a call, beside those of the rays under way then: some 10 ms, so that Ctrl-C need not wait for
 # long. A chunk of rays takes fewer on most meshes, and is not cut.
 _WORK = 1 << 14
@@ -113,26 +111,6 @@ class Progress(NamedTuple):
     begin: int
     following: int
     count: int  # type: ignore[assignment]  # tuples have a method of that name
-
-
-@kernel
-def are_coherent(rays, begin):
-    """Whether the sixteen rays from ``begin`` on share their dominant axis, its sign and nearly their slopes."""
-    d, step = offset(rays.directions, begin * rays.direction_step), rays.direction_step
-    ax, ay, az = abs(load(d, 0)), abs(load(d, 1)), abs(load(d, 2))
-    w = 2 if az >= ax and az >= ay else (1 if ay >= ax else 0)
-    u, v = (w + 1) % 3, (w + 2) % 3
-    first = load(d, w)
-    slope_u, slope_v = load(d, u) / first, load(d, v) / first
-    for r in range(1, WIDTH):
-        dw, du, dv = load(d, step * r + w), load(d, step * r + u), load(d, step * r + v)
-        size = abs(dw)
-        # Strictly larger: between equal components the choice of ``make_shear`` depends on which they are.
-        dominant = size > abs(du) and size > abs(dv) and dw * first > 0.0
-        if not (dominant and abs(du - slope_u * dw) <= _SPREAD * size and abs(dv - slope_v * dw) <= _SPREAD * size):
-            return False
-    size = abs(first)
-    return size > abs(load(d, u)) and size > abs(load(d, v))
 
 
 class _Query(NamedTuple):
@@ -209,7 +187,7 @@ def _hand_over(tree, query, top, unresolved):
     """
     scratch, prepared, lanes = query.scratch, query.scratch.prepared, query.scratch.lanes
     for r in range(WIDTH):
-        begin_ray(prepared, lanes, r, load(prepared.integers, NUMBER + r))
+        begin_ray(tree, query.rays, prepared, lanes, r, load(prepared.integers, NUMBER + r))
         store(prepared.integers, UNRESOLVED + r, (unresolved >> r) & 1)
     for k in range(top):
         entry = load(scratch.packet_stack, k)
@@ -224,7 +202,7 @@ def _hand_over(tree, query, top, unresolved):
             store(prepared.integers, UNRESOLVED + r, 0)
             _finish(tree, query, r)
         else:
-            counts = list_lane(lanes, r, resume(tree, prepared, lanes, r), counts)
+            counts = list_lane(lanes, r, resume(tree, query.rays, prepared, lanes, r), counts)
     return _run(tree, query, counts, Queue(scratch.waiting, np.int64(0), np.int64(0)))[1]
 
 
@@ -280,7 +258,7 @@ def _trace_on(tree, query, progress, end):
     """``trace`` for more rays; returns the ``Progress`` after them."""
     rounds, following, count, waiting = np.int64(0), progress.following, progress.count, query.scratch.waiting
     for first in range(progress.begin, end, WIDTH):
-        if first + WIDTH <= end and are_coherent(query.rays, first):
+        if first + WIDTH <= end and tree.ways.are_coherent(query.rays, first):
             rounds += _trace_sixteen(tree, query, first)
             if rounds > _WORK:
                 return Progress(first + WIDTH, following, count)

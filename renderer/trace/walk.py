@@ -31,7 +31,25 @@ def first_block(leaf):
 @inlined
 def child_in(tree, node, octant):
     """The node or leaf in an octant of a node."""
+    return tree.ways.child(tree, node, octant)
+
+
+@inlined
+def child_of_node(tree, node, octant):
+    """``child_in`` of a mesh."""
     return np.int64(load(tree.links, node * NODE_WORDS + CHILDREN + octant))
+
+
+@inlined
+def boxes_of(tree, node):
+    """The boxes of a node's octants: a pointer, and where the six rows of eight begin there."""
+    return tree.ways.boxes(tree, node)
+
+
+@inlined
+def boxes_of_node(tree, node):
+    """``boxes_of`` a mesh."""
+    return tree.nodes, node * NODE_WORDS
 
 
 @inlined

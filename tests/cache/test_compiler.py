@@ -159,7 +159,7 @@ import sys
 import numpy as np
 from numba import njit
 from renderer import Octree
-from renderer.trace.leaf import tree_pointers
+from renderer.trace.trees import tree_pointers
 from renderer.trace.batch import check_rays
 from renderer.trace.rays import HIT_ROWS, hit_pointers, ray_pointers
 from renderer.trace.traverse import new_scratch, scratch_pointers, trace

@@ -17,7 +17,7 @@ from renderer.inside.winding_search import _FIRST, _point_at, _Query, _search
 from renderer.jit.decorators import kernel
 from renderer.mesh.shapes import box, icosphere, lattice_faces, torus
 from renderer.numerics.simd import local_doubles, offset, pointer
-from renderer.trace.leaf import tree_pointers
+from renderer.trace.trees import tree_pointers
 from renderer.trace.walk import stack_size
 from validation.stability.cases.queries.inside import closed_solids, points_at, winding_numbers
 

@@ -24,9 +24,9 @@ from renderer.jit.decorators import kernel
 from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
 from renderer.trace.batch import NO_STARTS, RayBatch
-from renderer.trace.leaf import tree_pointers
 from renderer.trace.rays import HIT_ROWS, hit_pointers, ray_pointers
 from renderer.trace.traverse import new_scratch, scratch_pointers, search_blocks, trace
+from renderer.trace.trees import tree_pointers
 
 # What arithmetic may end in, or begin with when nobody looked.
 WORST = np.array([0.0, 1.0, 0.3, 5e-324, 1e-310, 1e-30, 1e30, FARTHEST, 2.0**127, 3.5e38, 1e40, 1e300, 1.7e308, np.inf])

@@ -18,8 +18,8 @@ from renderer.results.hits import Hits
 from renderer.trace.best import FaceHit
 from renderer.trace.intersect import FAR_PADDING, Ray, box_limit, hit_triangles, largest_of, make_shear, round_down
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
-from renderer.trace.leaf import tree_pointers
 from renderer.trace.resolve import _meet_slab, resolve_uncertain
+from renderer.trace.trees import tree_pointers
 from validation.oracle import exact
 
 SIDE = 60

@@ -13,6 +13,7 @@ from renderer.numerics.double_double import as_pairs, dot_pairs, quotient
 from renderer.numerics.simd import load, maximum, minimum
 from renderer.numerics.vec3 import add, barycentric, cross, dot, largest_component, largest_of_three, length, sub
 from renderer.trace.edge_signs import corners_at
+from renderer.trace.intersect import face_in
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import octants_around
 from renderer.trace.starts.anchor import anchor_of
@@ -210,7 +211,7 @@ def _enter(tree, query, node, count):
 def _list_in(tree, query, first, blocks, count):
     """List the touching faces of some blocks that may contain a point."""
     for slot in range(first * BLOCK_FACES, (first + blocks) * BLOCK_FACES):
-        face = load(tree.faces, slot)
+        face = face_in(tree, slot)
         if face >= 0 and load(query.touching, face) != 0:
             place = slot // BLOCK_FACES * BLOCK_WORDS + slot % BLOCK_FACES
             held = _hold_sign(corners_at(tree, place), query.o, query.room)

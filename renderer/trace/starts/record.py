@@ -58,20 +58,32 @@ def start_pointers(starts):
 
 
 @inlined
-def start_at(starts, i, unit):
-    """The ``Start`` of ray ``i``, whose face is not -1; ``unit`` of its units are one of the mesh."""
+def start_at(tree, starts, i):
+    """The ``Start`` of ray ``i``, whose face is not -1."""
     row = offset(starts.rows, i * starts.step)
     face, code = np.int64(load(row, FACE)), np.int64(load(row, CODE))
     anchor = (load(row, ANCHOR), load(row, ANCHOR + 1), load(row, ANCHOR + 2))
     if code & BARYCENTRIC == 0:
-        anchor = scale(anchor, unit)
-    return Start(corners_of(starts.vertices, starts.faces, face, unit), anchor, face, code)
+        anchor = scale(anchor, tree.scale)
+    return Start(corners_in(tree, starts, face), anchor, face, code)
 
 
 @inlined
 def way_back(starts, i):
     """The vector back of ray ``i``, whose code has BACK."""
     return three(starts.rows, i * starts.step + WAY)
+
+
+@inlined
+def corners_in(tree, starts, face):
+    """The corners of a face of the mesh that rays start on, as tuples, in the tree's units."""
+    return tree.ways.corners_of_face(tree, starts, face)
+
+
+@inlined
+def corners_of_mesh(tree, starts, face):
+    """``corners_in`` of a mesh."""
+    return corners_of(starts.vertices, starts.faces, face, tree.scale)
 
 
 @inlined

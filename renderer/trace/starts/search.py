@@ -10,13 +10,14 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import as_pairs, cross_pairs, dot_pairs, power_below, quotient, scaled_difference
-from renderer.numerics.simd import load, local_doubles, lowest_bit, maximum, minimum, pointer, store
+from renderer.numerics.simd import local_doubles, lowest_bit, maximum, minimum, pointer, store
 from renderer.numerics.vec3 import add, largest_component, sub
 from renderer.trace.best import NO_FACE, Best, FaceHit, hit_on, is_better, no_hit
 from renderer.trace.edge_signs import corners_at
 from renderer.trace.intersect import (
     CORNER,
     Ray,
+    face_in,
     hit_triangles,
     make_shear,
     near_planes,
@@ -24,7 +25,7 @@ from renderer.trace.intersect import (
     unsure_sides,
 )
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
-from renderer.trace.leaf import octants_around, resolved_hit, tree_pointers
+from renderer.trace.leaf import octants_around, resolved_hit
 from renderer.trace.single_ray import Found, SingleRay, enter_counted, prepare_single
 from renderer.trace.starts.anchor import anchor_of, from_anchor, rounded
 from renderer.trace.starts.arcs import arcs_of
@@ -51,12 +52,13 @@ from renderer.trace.starts.record import (
     KNOWN,
     THROUGH,
     StartPointers,
-    corners_of,
+    corners_in,
     slack_of,
     start_at,
     way_back,
 )
 from renderer.trace.starts.region import NOT_STOPPED, Behind, bounding_holder, holder_of, stopping_holder
+from renderer.trace.trees import tree_pointers
 from renderer.trace.walk import walk
 
 # The boxes of the faces that hold a start hold it as rounded, with so much room of its coordinates.
@@ -115,7 +117,7 @@ def _add_holders(tree, query, first, blocks, count):
     """List the faces of some blocks that contain an anchor."""
     for block in range(first, first + blocks):
         for i in range(BLOCK_FACES):
-            face, place = load(tree.faces, block * BLOCK_FACES + i), block * BLOCK_WORDS + i
+            face, place = face_in(tree, block * BLOCK_FACES + i), block * BLOCK_WORDS + i
             if face >= 0 and _box_holds(tree, place, query.o):
                 met = meet_face(seen_from(tree, place, query.anchor), query.anchor, query.d, query.slope, query.dz)
                 if met.kind == HOLDS:
@@ -156,7 +158,7 @@ def depart(tree, starts, i, ray, stack, memory):
     ``ray`` is from ``rays.ray_at``. ``stack`` is memory for ``walk.stack_size`` int64, and ``memory`` for
     ``cone.HOLDERS_WORDS``.
     """
-    start = start_at(starts, i, tree.scale)
+    start = start_at(tree, starts, i)
     anchor = anchor_of(start)
     o, (d, unit) = rounded(anchor), unit_direction((ray.dx, ray.dy, ray.dz))
     at_corner = ray.slack == CORNER
@@ -218,7 +220,7 @@ def _nearest_from(tree, first, count, departure, shear, best):
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
-            face = load(tree.faces, block * BLOCK_FACES + i)
+            face = face_in(tree, block * BLOCK_FACES + i)
             if np.float64(face) == ray.leaving:
                 continue
             if (near >> i) & 1 != 0:
@@ -265,8 +267,8 @@ def _visit(tree, query, first, count, found):
 @kernel
 def t_from(tree, starts, i, ray, face, t):
     """t from the exact start for the plane of a face that the ray hits at t."""
-    anchor, (d, unit) = anchor_of(start_at(starts, i, tree.scale)), unit_direction((ray.dx, ray.dy, ray.dz))
-    p0, p1, p2 = corners_of(starts.vertices, starts.faces, face, tree.scale)
+    anchor, (d, unit) = anchor_of(start_at(tree, starts, i)), unit_direction((ray.dx, ray.dy, ray.dz))
+    p0, p1, p2 = corners_in(tree, starts, face)
     side = maximum(largest_component(sub(p1, p0)), largest_component(sub(p2, p0)))
     factor = 1.0 / power_below(side)
     normal = cross_pairs(scaled_difference(p1, p0, factor), scaled_difference(p2, p0, factor))
@@ -295,7 +297,7 @@ def take_side(tree, starts, n, stack, memory, table, room):
     own does not bound that region. Also write its ``fan`` to ``table``, if ``room`` float64 suffice. If n selects
     nothing, the row stays.
     """
-    start, holders = start_at(starts, 0, tree.scale), make_holders(memory)
+    start, holders = start_at(tree, starts, 0), make_holders(memory)
     anchor, (d, _) = anchor_of(start), unit_direction(n)
     slope = slope_there(anchor, d)
     count = list_holders(tree, anchor, d, slope, 1.0, stack, holders)

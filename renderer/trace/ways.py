@@ -1,0 +1,34 @@
+"""How kernels read what they trace: one mesh's tree, or a scene of placed trees."""
+
+from typing import Any, NamedTuple
+
+
+class Ways(NamedTuple):
+    """The kernels by which a traversal reads what it traces. They are chosen when it is compiled, and cost no call.
+
+    Nodes, blocks, and places in them are numbers that only these kernels take apart.
+
+    corners          corners(tree, base, rows): ``intersect.load_corners``
+    coordinate       coordinate(tree, at): ``edge_signs.coordinate``
+    face             face(tree, slot): ``intersect.face_in``
+    corners_of_face  corners_of_face(tree, starts, face): ``record.corners_in``
+    child            child(tree, node, octant): ``walk.child_in``
+    boxes            boxes(tree, node): ``walk.boxes_of``
+    enter            enter(tree, node, single, upper): ``single_ray.enter_node`` up to a distance
+    begin            begin(rays, prepared, r, number): what a lane keeps of a ray beside ``ray_lanes.prepare_ray``
+    node_of          node_of(tree, prepared, r): nodes, links and the place of the node that a lane is at
+    resume           resume(tree, rays, prepared, lanes, r): ``stream.resume``
+    are_coherent     are_coherent(rays, begin): whether sixteen rays begin as a packet
+    """
+
+    corners: Any
+    coordinate: Any
+    face: Any
+    corners_of_face: Any
+    child: Any
+    boxes: Any
+    enter: Any
+    begin: Any
+    node_of: Any
+    resume: Any
+    are_coherent: Any
