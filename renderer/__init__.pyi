@@ -13,6 +13,10 @@ from .picture.image import srgb as srgb
 from .picture.prepare import PreparedScene as PreparedScene
 from .picture.render import prepare as prepare
 from .picture.render import render as render
+from .rayscene.hits import SceneAllHits as SceneAllHits
+from .rayscene.hits import SceneClosestPoints as SceneClosestPoints
+from .rayscene.hits import SceneHits as SceneHits
+from .rayscene.scene import RayScene as RayScene
 from .results.closest_points import ClosestPoints as ClosestPoints
 from .results.hits import AllHits as AllHits
 from .results.hits import Hits as Hits

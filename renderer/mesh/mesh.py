@@ -642,7 +642,9 @@ class Mesh:
             normals = turned * (-1.0 if mirrors else 1.0)
         faces = self.faces[:, [0, 2, 1]] if mirrors else self.faces
         with np.errstate(over="ignore", invalid="ignore"):  # the constructor rejects it with its row
-            vertices = self.vertices @ linear.T + affine[:3, 3]
+            # Term by term: a product of matrices has other bits on other processors.
+            x, y, z = self.vertices.T
+            vertices = np.stack([((x * a + y * b) + z * c) + d for a, b, c, d in affine[:3]], axis=1)
         return replace(self, vertices=vertices, faces=faces, normals=normals)
 
     @overload

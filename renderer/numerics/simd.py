@@ -217,6 +217,12 @@ def local_doubles(typingctx):
 
 
 @intrinsic
+def local_floats(typingctx):
+    """A ``pointer`` to LOCAL_WORDS float32, like ``local_words``."""
+    return _local(types.float32, ir.FloatType())
+
+
+@intrinsic
 def double_of(typingctx, bits):
     """The float64 with the bits of an int64."""
 

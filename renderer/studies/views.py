@@ -273,7 +273,7 @@ def _first_hits(octree: Queries, place: Floats, directions: Floats, reach: Float
         count, (face, code) = len(directions), row[[FACE, CODE]].astype(np.int64)
         leaving = Leaving(np.full(count, face), np.full(1, code), np.tile(row[ANCHOR : ANCHOR + 3], (count, 1)))
         rays = offset_origins(rays, leaving, mesh, tree.scale, octree.threads)
-        rays.starts[HEAD:].view(np.float64).reshape(count, ROW)[:, WAY:] = outer
+        rays.starts[HEAD:].view(np.float64).reshape(count, ROW)[:, WAY : WAY + 3] = outer
     return closest_hits(tree, rays, mesh, octree.threads)
 
 

@@ -14,7 +14,7 @@ from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.system.threads import for_chunks
 from renderer.trace.spawn import FARTHEST_START, offset_from_faces
-from renderer.trace.starts.record import FACE, FACES, HEAD, ROW, ROW_STEP, VERTICES
+from renderer.trace.starts.record import FACE, FACES, HEAD, IGNORED, MASK, ROW, ROW_STEP, VERTICES
 
 # The most rays of a chunk: small enough to share 1e5 rays between many threads and to stop within milliseconds on
 # Ctrl-C, large enough that taking a chunk costs nothing beside its 1 to 10 ms of tracing.
@@ -51,9 +51,14 @@ def _bound(argument: str, given: NDArray[Any], shape: tuple[int, ...], largest: 
     return array
 
 
+# The mask of a ray that may hit every instance.
+ALL = float((1 << 32) - 1)
+
+
 def _no_starts() -> NDArray[np.int64]:
     starts = np.zeros(HEAD + ROW, np.int64)
-    starts[HEAD:].view(np.float64)[FACE] = -1.0
+    row = starts[HEAD:].view(np.float64)
+    row[FACE], row[MASK], row[IGNORED] = -1.0, ALL, -1.0
     return starts
 
 

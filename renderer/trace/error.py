@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.mesh.mesh import Mesh
 from renderer.results.hits import AllHits, Hits
 from renderer.system.threads import for_chunks
 from renderer.trace.batch import CHUNK, RayBatch
@@ -17,11 +18,23 @@ def add_errors(
     A ray nearly in a face's plane may hit by rounding alone. The bound then holds for the ray's interval inside the
     face's box. ``rows`` are the rays of the hits; None: one hit a ray. ``scale`` is the tree's.
     """
-    mesh, errors = hits._mesh, np.empty(len(hits.t))
-    own = np.empty(0, np.int64) if rows is None else rows
+    hits.t_error = errors_of(hits._mesh, hits.face, hits.t, rays, rows, scale, threads)
+
+
+def errors_of(
+    mesh: Mesh,
+    face: NDArray[np.int64],
+    t: NDArray[np.float64],
+    rays: RayBatch,
+    rows: NDArray[np.int64] | None,
+    scale: float,
+    threads: int,
+) -> NDArray[np.float64]:
+    """The bounds of ``add_errors`` for hits at t on faces of a mesh, nan for face -1."""
+    errors, own = np.empty(len(t)), np.empty(0, np.int64) if rows is None else rows
 
     def bound(begin: int, end: int) -> None:
-        bound_errors(mesh.vertices, mesh.faces, rays, own, hits.t, hits.face, errors, begin, end, scale)
+        bound_errors(mesh.vertices, mesh.faces, rays, own, t, face, errors, begin, end, scale)
 
     for_chunks(bound, len(errors), CHUNK, threads)
-    hits.t_error = errors
+    return errors

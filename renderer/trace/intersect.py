@@ -127,6 +127,8 @@ class Ray(NamedTuple):
 
     slack    bound of the distance of the origin from the start on the surface, with room; 0 if it starts on none
     leaving  the face that it starts on, as float64; -1 for none
+    mask     in a scene, the bits of the instances that it may hit, as float64
+    ignored  in a scene, the instance that it does not hit, as float64; -1 for none
     """
 
     ox: Any
@@ -138,6 +140,8 @@ class Ray(NamedTuple):
     t_min: Any
     slack: Any = 0.0
     leaving: Any = -1.0
+    mask: Any = 4294967295.0
+    ignored: Any = -1.0
 
 
 @inlined

@@ -73,10 +73,7 @@ def prepare_ray(rays, r, ray, t_max):
     floats, doubles, integers = rays.floats, rays.doubles, rays.integers
     largest = largest_of(ray)
     slabs, shear = make_slabs(ray, largest), make_shear(ray)
-    _put_axes(floats, NEAR_ORIGIN + r, slabs.near_origin_x, slabs.near_origin_y, slabs.near_origin_z)
-    _put_axes(floats, FAR_ORIGIN + r, slabs.far_origin_x, slabs.far_origin_y, slabs.far_origin_z)
-    _put_axes(floats, NEAR_INVERSE + r, slabs.near_inverse_x, slabs.near_inverse_y, slabs.near_inverse_z)
-    _put_axes(floats, FAR_INVERSE + r, slabs.far_inverse_x, slabs.far_inverse_y, slabs.far_inverse_z)
+    put_slabs(rays, r, slabs)
     store(floats, LOWER + r, round_down(ray.t_min * largest))
     store(floats, LIMIT + r, box_limit(t_max, largest))
     # The shear divides by a component that may be negative, the slopes divide by its absolute value.
@@ -91,10 +88,20 @@ def prepare_ray(rays, r, ray, t_max):
     store(doubles, LARGEST + r, largest)
     store(doubles, SLACK + r, ray.slack)
     store(doubles, LEAVING + r, ray.leaving)
-    _put_axes(integers, NEAR_ROW + r, slabs.near_x, slabs.near_y, slabs.near_z)
     _put_axes(integers, BLOCK_ROW + r, shear.row_x, shear.row_y, shear.row_z)
     store(doubles, T + r, t_max)
     store(integers, FACE + r, broadcast_like(np.int64(NO_FACE), t_max))
+
+
+@inlined
+def put_slabs(rays, r, slabs):
+    """Write ``Slabs`` to lane ``r``, or those of eight rays to the lanes from ``r`` on."""
+    floats = rays.floats
+    _put_axes(floats, NEAR_ORIGIN + r, slabs.near_origin_x, slabs.near_origin_y, slabs.near_origin_z)
+    _put_axes(floats, FAR_ORIGIN + r, slabs.far_origin_x, slabs.far_origin_y, slabs.far_origin_z)
+    _put_axes(floats, NEAR_INVERSE + r, slabs.near_inverse_x, slabs.near_inverse_y, slabs.near_inverse_z)
+    _put_axes(floats, FAR_INVERSE + r, slabs.far_inverse_x, slabs.far_inverse_y, slabs.far_inverse_z)
+    _put_axes(rays.integers, NEAR_ROW + r, slabs.near_x, slabs.near_y, slabs.near_z)
 
 
 @inlined

@@ -25,7 +25,7 @@ from renderer.numerics.simd import (
 )
 from renderer.trace.best import NO_FACE
 from renderer.trace.intersect import Ray
-from renderer.trace.starts.record import FACE, SLACK, StartPointers, start_pointers
+from renderer.trace.starts.record import FACE, IGNORED, MASK, SLACK, StartPointers, start_pointers
 
 _MOST, _TINIEST = np.finfo(np.float64).max, 2.0**-1074
 _BYTES = 8
@@ -142,7 +142,7 @@ def ray_at(rays, i):
     row = offset(rays.starts.rows, i * rays.starts.step)
     return _scaled(
         origin, direction, load(rays.t_min, i * rays.min_step), load(rays.t_max, i * rays.max_step), rays.scale,
-        load(row, SLACK), load(row, FACE),
+        load(row, SLACK), load(row, FACE), load(row, MASK), load(row, IGNORED),
     )  # fmt: skip
 
 
@@ -166,17 +166,20 @@ def _often_one(base, numbers, step, column):
 
 @inlined
 def starts8(starts, numbers):
-    """Slack and face, as in ``Ray``, of the eight rays numbered at ``numbers``."""
+    """Slack, face, mask and the instance ignored, as in ``Ray``, of the eight rays numbered at ``numbers``."""
     rows, step = starts.rows, starts.step
-    return _often_one(rows, numbers, step, SLACK), _often_one(rows, numbers, step, FACE)
+    return (
+        _often_one(rows, numbers, step, SLACK), _often_one(rows, numbers, step, FACE),
+        _often_one(rows, numbers, step, MASK), _often_one(rows, numbers, step, IGNORED),
+    )  # fmt: skip
 
 
 @inlined
-def _scaled(origin, direction, t_min, t_max, scale, slack, leaving):
+def _scaled(origin, direction, t_min, t_max, scale, slack, leaving, mask, ignored):
     """Rays in the tree's units, given its ``scale``, and their t_max."""
     # A t_min above 0 stays above 0 in the tree's units too, so that a hit at the origin is still too near.
     t_min = select(t_min > 0.0, maximum(t_min * scale, _TINIEST), t_min)
-    ray = Ray(origin[0] * scale, origin[1] * scale, origin[2] * scale, *direction, t_min, slack, leaving)
+    ray = Ray(origin[0] * scale, origin[1] * scale, origin[2] * scale, *direction, t_min, slack, leaving, mask, ignored)
     # A hit whose t is beyond the largest float64, in either unit, is none.
     return ray, minimum(minimum(t_max, _MOST) * scale, _MOST)
 

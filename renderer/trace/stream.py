@@ -158,7 +158,7 @@ def begin_rays(tree, rays, prepared, lanes, queue, counts):
 @inlined
 def begin_ray(tree, rays, prepared, lanes, r, number):
     """Start the prepared ray in lane ``r`` at the root."""
-    tree.ways.begin(rays, prepared, r, number)
+    tree.ways.begin(tree, rays, prepared, r, number)
     integers, bottom = prepared.integers, stack_of(lanes, r)
     store(integers, CHILD + r, 0)
     store(integers, TOP + r, bottom + 1)
@@ -206,7 +206,7 @@ def meet_nodes(tree, rays, lanes, count):
 
 
 @inlined
-def begin_in_tree(rays, prepared, r, number):
+def begin_in_tree(tree, rays, prepared, r, number):
     """``Ways.begin`` of a mesh."""
 
 

@@ -2,9 +2,14 @@
 
 from typing import Any, NamedTuple
 
+import numba
+from numba import types
+from numba.extending import intrinsic
+
 from renderer.jit.decorators import inlined
 from renderer.numerics.simd import double_of, float32_pointer, float64_pointer, int32_pointer, load, pointer
 from renderer.trace.edge_signs import coordinate_of_block
+from renderer.trace.instances import scene_pointers
 from renderer.trace.intersect import corners_of_block, face_of_block
 from renderer.trace.layout import BLOCK_COUNT, BLOCKS, DEPTH, FACES, NODES, SCALE, WIDE
 from renderer.trace.packet import are_coherent
@@ -34,8 +39,7 @@ class TreePointers(NamedTuple):
 
 
 @inlined
-def tree_pointers(descriptor):
-    """The pointers in ``Tree.descriptor``, whose tree the caller must keep alive."""
+def _mesh_pointers(descriptor):
     at = pointer(descriptor)
     nodes, blocks = load(at, NODES), load(at, BLOCKS)
     return TreePointers(
@@ -53,3 +57,16 @@ def tree_pointers(descriptor):
             enter_node_of_tree, begin_in_tree, node_in_tree, resume_in_tree, are_coherent,
         ),
     )  # fmt: skip
+
+
+@intrinsic
+def _way_to_open(typingctx, descriptor):
+    """The kernel that opens a descriptor: scenes have uint64, trees int64."""
+    opens = scene_pointers if descriptor.dtype == types.uint64 else _mesh_pointers
+    return numba.typeof(opens)(descriptor), lambda context, builder, sig, args: context.get_dummy_value()
+
+
+@inlined
+def tree_pointers(descriptor):
+    """The pointers in ``Tree.descriptor``, or that of a scene, whose arrays the caller must keep alive."""
+    return _way_to_open(descriptor)(descriptor)

@@ -15,7 +15,7 @@ class Ways(NamedTuple):
     child            child(tree, node, octant): ``walk.child_in``
     boxes            boxes(tree, node): ``walk.boxes_of``
     enter            enter(tree, node, single, upper): ``single_ray.enter_node`` up to a distance
-    begin            begin(rays, prepared, r, number): what a lane keeps of a ray beside ``ray_lanes.prepare_ray``
+    begin            begin(tree, rays, prepared, r, number): what a lane keeps of a ray beside ``ray_lanes.prepare_ray``
     node_of          node_of(tree, prepared, r): nodes, links and the place of the node that a lane is at
     resume           resume(tree, rays, prepared, lanes, r): ``stream.resume``
     are_coherent     are_coherent(rays, begin): whether sixteen rays begin as a packet

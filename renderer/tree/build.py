@@ -45,13 +45,7 @@ def build_tree(
     """Build the tree over all faces; vertices are already multiplied by ``scale``. Without faces it has no nodes."""
     if not len(faces):
         return build_blocks(vertices, faces, scale, threads)
-    top, subtrees = build_parts(vertices, faces, rule, threads)
-    if len(subtrees) == 1:
-        built = next(iter(subtrees.values()))
-        nodes, block_faces, depth = cache_aligned(len(built.nodes), np.float32), built.block_faces, built.depth
-        nodes[:] = built.nodes
-    else:
-        nodes, block_faces, depth = _join(top, subtrees, rule, threads)
+    nodes, block_faces, depth = build_nodes(boxes_of_faces(vertices, faces, threads), rule, threads)
     return Tree(nodes, fill_blocks(vertices, faces, block_faces, threads), block_faces, depth, scale)
 
 
@@ -62,15 +56,37 @@ def build_blocks(vertices: NDArray[np.float64], faces: NDArray[np.int32], scale:
     return Tree(np.empty(0, np.float32), fill_blocks(vertices, faces, block_faces, threads), block_faces, 0, scale)
 
 
-def build_parts(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32], rule: Rule, threads: int
-) -> tuple[Hierarchy, dict[int, _Subtree]]:
-    """The top of the hierarchy, and the subtree of each of its whole parts."""
-    boxes = cache_aligned(len(faces) * BOX, np.float32)
-    order = Faces(boxes, boxes.view(np.int32), cache_aligned(len(boxes), np.float32))
+def boxes_of_faces(vertices: NDArray[np.float64], faces: NDArray[np.int32], threads: int) -> Faces:
+    """The boxes of all faces."""
+    order = new_faces(len(faces))
     for_chunks(
-        lambda begin, end: face_boxes(vertices, faces, boxes, order.numbers, begin, end), len(faces), _BOXES, threads
+        lambda begin, end: face_boxes(vertices, faces, order.boxes, order.numbers, begin, end),
+        len(faces),
+        _BOXES,
+        threads,
     )
+    return order
+
+
+def new_faces(count: int) -> Faces:
+    """Memory for the boxes of so many faces, to be filled."""
+    boxes = cache_aligned(count * BOX, np.float32)
+    return Faces(boxes, boxes.view(np.int32), cache_aligned(len(boxes), np.float32))
+
+
+def build_nodes(order: Faces, rule: Rule, threads: int) -> tuple[NDArray[np.float32], NDArray[np.int32], int]:
+    """Nodes over boxes, at least one; the faces of all blocks; and the levels of nodes."""
+    top, subtrees = build_parts(order, rule, threads)
+    if len(subtrees) > 1:
+        return _join(top, subtrees, rule, threads)
+    (built,) = subtrees.values()
+    nodes = cache_aligned(len(built.nodes), np.float32)
+    nodes[:] = built.nodes
+    return nodes, built.block_faces, built.depth
+
+
+def build_parts(order: Faces, rule: Rule, threads: int) -> tuple[Hierarchy, dict[int, _Subtree]]:
+    """The top of the hierarchy, and the subtree of each of its whole parts."""
     top, levels = _cut_top(order, rule, threads)
     return top, _build_subtrees(order, rule, top, levels, threads)
 

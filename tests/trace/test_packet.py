@@ -13,10 +13,9 @@ from renderer.octree import BruteForce, Octree
 from renderer.trace.batch import RayBatch
 from renderer.trace.intersect import Ray, box_limit, enter_boxes, make_slabs, round_down
 from renderer.trace.layout import NODE_WORDS
-from renderer.trace.packet import enter_beam, make_beam
+from renderer.trace.packet import are_coherent, enter_beam, make_beam
 from renderer.trace.ray_lanes import GROUP_STRIDE, WIDTH, Prepared, prepare_eight, prepare_ray
 from renderer.trace.rays import ray_at, ray_pointers
-from renderer.trace.traverse import are_coherent
 
 SEEDS = st.integers(0, 2**20)
 

@@ -16,7 +16,7 @@ from renderer.mesh.shapes import icosphere, torus
 from renderer.octree import Octree
 from renderer.trace.layout import BLOCK_FACES
 from renderer.tree.bounds import BOX, FACE, Faces, face_boxes
-from renderer.tree.build import SPLITS, build_parts, build_tree
+from renderer.tree.build import SPLITS, boxes_of_faces, build_parts, build_tree
 from renderer.tree.collapse import BLOCK_COST, NODE_COST, collapse
 from renderer.tree.hierarchy import Rule, add_part, first_parts, new_hierarchy
 from renderer.tree.invariants import faults
@@ -227,7 +227,7 @@ def test_the_tree_costs_what_the_collapse_said(split, leaf_size):
     for kind in ("soup", "sizes"):
         mesh = Mesh(*make_mesh(kind, 8, 1000))
         octree = Octree.from_mesh(mesh, split=split, leaf_size=leaf_size)
-        _, subtrees = build_parts(mesh.vertices, mesh.faces, Rule(SPLITS[split], leaf_size, 32), 1)
+        _, subtrees = build_parts(boxes_of_faces(mesh.vertices, mesh.faces, 1), Rule(SPLITS[split], leaf_size, 32), 1)
         x, y, z = mesh.triangles.max(axis=(0, 1)) - mesh.triangles.min(axis=(0, 1))
         assert octree.stats.cost * (x * y + y * z + z * x) == pytest.approx(subtrees[0].cost, rel=1e-4)
 

@@ -14,8 +14,8 @@ ROW_STEP, VERTICES, FACES, HEAD = 0, 1, 2, 8
 # The columns of a row, float64: the slack of ``intersect.Ray``, EDGE where the start is on an edge, or stopped at once;
 # the face, -1 for none; the code; the anchor: the point as given, or the barycentrics u and v and, of a ray that came
 # through the face, PILE: the first of the faces that coincide there; and the way back, a direction that
-# is on the side where the ray starts.
-SLACK, FACE, CODE, ANCHOR, PILE, WAY, ROW = 0, 1, 2, 3, 5, 6, 9
+# is on the side where the ray starts. Then mask and instance ignored, as of ``intersect.Ray``.
+SLACK, FACE, CODE, ANCHOR, PILE, WAY, MASK, IGNORED, ROW = 0, 1, 2, 3, 5, 6, 9, 10, 11
 # The slack of a ray that no search takes as it is: ``search.search_from`` decides.
 EDGE = np.inf
 # The bits of a code: the side of the face that the ray starts on is known, and is that of its normal; the ray came

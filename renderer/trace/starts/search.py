@@ -163,7 +163,9 @@ def depart(tree, starts, i, ray, stack, memory):
     o, (d, unit) = rounded(anchor), unit_direction((ray.dx, ray.dy, ray.dz))
     at_corner = ray.slack == CORNER
     if at_corner or ray.slack == EDGE:
-        ray = Ray(o[0], o[1], o[2], ray.dx, ray.dy, ray.dz, ray.t_min, slack_of(o, 0.0), ray.leaving)
+        ray = Ray(
+            o[0], o[1], o[2], ray.dx, ray.dy, ray.dz, ray.t_min, slack_of(o, 0.0), ray.leaving, ray.mask, ray.ignored
+        )
     stopped, slope, count = no_hit(np.inf), slope_there(anchor, d), 0
     if start.code & KNOWN != 0 and ray.t_min == 0.0:
         dz, holders = make_shear(ray).direction_z, make_holders(memory)

@@ -1,0 +1,1 @@
+"""Scenes for rays: many meshes, each placed many times."""

@@ -1,0 +1,273 @@
+"""A scene at one moment, as queries read it: instances in order, and the nodes over them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.errors import expect
+from renderer.lazy import lazy
+from renderer.mesh.mesh import Mesh
+from renderer.octree import Octree
+from renderer.queryable import Built
+from renderer.rayscene.placing import box_all, corners_of_faces, locate
+from renderer.system.threads import for_chunks
+from renderer.trace.instances import (
+    FIRST_FACE,
+    FLAGS,
+    HALF,
+    HIDDEN,
+    INSTANCE_COUNT,
+    INSTANCE_WORDS,
+    INSTANCES,
+    MATRIX,
+    MESH_FACES,
+    MIDDLE,
+    NUMBER_BITS,
+    OBJECT_WORDS,
+    SCENE_WORDS,
+    TOP_NODES,
+    VERTICES,
+)
+from renderer.trace.layout import BLOCK_WORDS, CHILDREN, LEAF_BITS, NODE_WORDS, TREE_WORDS, UNUSED, cache_aligned
+from renderer.tree.bounds import BOX
+from renderer.tree.build import SPLITS, build_nodes, new_faces
+from renderer.tree.hierarchy import Rule
+
+# The faces of a scene are numbered by int32, and the largest number means none.
+MOST_FACES = np.iinfo(np.int32).max - 1
+# A block and the place in it share a number with the instance.
+_MOST_BLOCKS = (1 << NUMBER_BITS) // BLOCK_WORDS
+# The largest coordinate of a scene, as of the boxes of a mesh (``octree``).
+_LARGEST = np.float32(2.0**60)
+# Faces that are looked for together: a tenth of a millisecond.
+_CHUNK = 4096
+_RULE = Rule(SPLITS["midpoint"], 1, 32)
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """A mesh of a scene with its tree, and where its instances are among all."""
+
+    id: int
+    name: str
+    built: Built
+    begin: int
+    count: int
+
+    @lazy
+    def row(self) -> NDArray[np.int64]:
+        """The object as kernels read it. It holds addresses, valid as long as this is kept."""
+        mesh, tree = self.built
+        row = np.zeros(OBJECT_WORDS, np.int64)
+        row[:TREE_WORDS] = tree.descriptor
+        row[VERTICES], row[MESH_FACES] = mesh.vertices.ctypes.data, mesh.faces.ctypes.data
+        lower, upper = np.stack(mesh.bounds) * tree.scale if len(mesh.faces) else np.zeros((2, 3))
+        numbers = row.view(np.float64)
+        numbers[MIDDLE : MIDDLE + 3] = lower / 2 + upper / 2
+        # A rounding more, so that the box is around all corners.
+        numbers[HALF : HALF + 3] = np.nextafter((upper - lower) / 2, np.inf)
+        return row
+
+
+class SceneTree:
+    """The nodes over the instances of a scene. It has what queries read of ``layout.Tree``."""
+
+    has_nodes, scale = True, 1.0
+
+    def __init__(self, members: list[Member], instances: NDArray[np.float64], threads: int) -> None:
+        words = instances.view(np.int64)
+        shown = np.flatnonzero(words[:, FLAGS] & HIDDEN == 0)
+        faces = {member.id: len(member.built.mesh.faces) for member in members}
+        filled = np.repeat([faces[m.id] > 0 for m in members], [m.count for m in members])
+        shown = shown[filled[shown]]
+        self.members, self.instances = members, instances
+        self.nodes, levels = _top(instances, words, shown, threads)
+        self.depth = levels + max((member.built.tree.depth for member in members), default=0) + 1
+
+    @lazy
+    def descriptor(self) -> NDArray[np.uint64]:
+        """The scene as kernels read it, see ``trace.instances``."""
+        words = np.zeros(SCENE_WORDS, np.uint64)
+        words[TOP_NODES], words[INSTANCES] = self.nodes.ctypes.data, self.instances.ctypes.data
+        words[INSTANCE_COUNT] = len(self.instances)
+        return words
+
+
+def _top(
+    instances: NDArray[np.float64], words: NDArray[np.int64], shown: NDArray[np.int64], threads: int
+) -> tuple[NDArray[np.float32], int]:
+    """The nodes over the instances ``shown``, whose links are those, and their levels."""
+    if not len(shown):
+        nodes = cache_aligned(NODE_WORDS, np.float32)
+        nodes[:] = 0.0
+        rows = nodes[:CHILDREN].reshape(3, 2, 8)
+        rows[:, 0], rows[:, 1] = np.inf, -np.inf
+        nodes.view(np.int32)[CHILDREN : CHILDREN + 8] = UNUSED
+        return nodes, 1
+    order = new_faces(len(shown))
+    box_all(instances, words, shown, order.boxes, order.numbers)
+    boxes = order.boxes.reshape(-1, BOX)
+    if not (np.abs(boxes[:, [0, 1, 2, 4, 5, 6]]) <= _LARGEST).all():
+        row = int((~(np.abs(boxes[:, :7]) <= _LARGEST).all(axis=1)).argmax())
+        expect(False, "transforms", f"coordinates up to {_LARGEST:.3g}", f"larger ones of instance {shown[row]}")
+    nodes, block_faces, depth = build_nodes(order, _RULE, threads)
+    links = nodes.view(np.int32).reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8]
+    used = nodes.reshape(-1, NODE_WORDS)[:, :8] <= nodes.reshape(-1, NODE_WORDS)[:, 8:16]
+    leaves = used & (links < 0)
+    links[leaves] = ~shown[block_faces[4 * (~links[leaves] >> LEAF_BITS)]].astype(np.int32)
+    return nodes, depth
+
+
+class Located(NamedTuple):
+    """Where faces of a scene are: their objects, which instances of those, which faces of their meshes, and whether
+    the instances are mirrored.
+    """
+
+    object: NDArray[np.int64]
+    instance: NDArray[np.int64]
+    face: NDArray[np.int64]
+    mirrored: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class BuiltScene:
+    """A scene at one moment: its members in order, and the tree over their instances.
+
+    To queries it is its own mesh. What they need of a mesh beside its tree is here; only what no tree knows is computed
+    from the merged mesh.
+    """
+
+    members: list[Member]
+    top: SceneTree
+    threads: int
+
+    @property
+    def tree(self) -> Any:
+        """What queries take for the tree."""
+        return self.top
+
+    @lazy
+    def count(self) -> int:
+        """The number of faces of all instances."""
+        return sum(m.count * len(m.built.mesh.faces) for m in self.members)
+
+    @property
+    def mesh(self) -> Any:
+        """What queries take for the mesh."""
+        return self
+
+    @property
+    def faces(self) -> range:
+        """The numbers of the faces of all instances."""
+        return range(self.count)
+
+    @lazy
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """A box around all that is shown."""
+        rows = self.top.nodes[:CHILDREN].reshape(3, 2, 8)
+        return np.float64(rows[:, 0].min(axis=1)), np.float64(rows[:, 1].max(axis=1))
+
+    @property
+    def vertices(self) -> NDArray[np.float64]:
+        """The vertices of the merged mesh."""
+        return self.merged.mesh.vertices
+
+    @property
+    def triangles(self) -> NDArray[np.float64]:
+        """The triangles of the merged mesh."""
+        return self.merged.mesh.triangles
+
+    @lazy
+    def open_edges(self) -> NDArray[Any]:
+        """``Mesh.open_edges`` of the merged mesh, which has none if no placed mesh has one."""
+        return self._edges("open_edges")
+
+    @lazy
+    def odd_edges(self) -> NDArray[Any]:
+        """``Mesh.odd_edges`` of the merged mesh, which has none if no placed mesh has one."""
+        return self._edges("odd_edges")
+
+    def _edges(self, of: str) -> NDArray[Any]:
+        own = [getattr(m.built.mesh, of) for m in self.members]
+        edges: NDArray[Any] = getattr(self.merged.mesh, of) if any(map(len, own)) else np.empty((0, 2), np.int64)
+        return edges
+
+    def is_closed(self) -> bool:
+        """``Mesh.is_closed`` of the merged mesh, which is closed if all placed meshes are."""
+        return all(m.built.mesh.is_closed() for m in self.members) or self.merged.mesh.is_closed()
+
+    @lazy
+    def merged(self) -> Octree:
+        """The one mesh that the placed meshes make together."""
+        return Octree.from_mesh(Mesh.concatenate(list(self._placed())), threads=self.threads)
+
+    def _placed(self) -> Iterator[Mesh]:
+        """The mesh of each instance that is shown."""
+        flags = self.top.instances.view(np.int64)[:, FLAGS]
+        for m in self.members:
+            for matrix, flag in zip(self.matrices(m), flags[m.begin :], strict=False):
+                if flag & HIDDEN == 0:
+                    yield m.built.mesh.transformed(np.concatenate([matrix, [[0.0, 0.0, 0.0, 1.0]]]))
+
+    def matrices(self, member: Member) -> NDArray[np.float64]:
+        """The transforms of a member's instances, (k, 3, 4)."""
+        return matrices_of(member, self.top.instances)
+
+    def located(self, faces: NDArray[np.int64]) -> Located:
+        """Where faces of the scene (...) are; -1 for -1."""
+        flat = np.ascontiguousarray(faces).reshape(-1)
+        instance, local, mirrored = np.empty_like(flat), np.empty_like(flat), np.empty(len(flat), np.bool_)
+        words = self.top.instances.view(np.int64)
+
+        def find(begin: int, end: int) -> None:
+            locate(words, flat, instance, local, mirrored, begin, end)
+
+        for_chunks(find, len(flat), _CHUNK, self.threads)
+        begins = np.array([m.begin for m in self.members] + [0])
+        ids = np.array([m.id for m in self.members] + [-1])
+        member = np.where(instance >= 0, np.searchsorted(begins[:-1], instance, side="right") - 1, -1)
+        return Located(
+            *(values.reshape(faces.shape) for values in (ids[member], instance - begins[member], local, mirrored))
+        )
+
+    def corners(self, faces: NDArray[np.int64]) -> NDArray[np.float64]:
+        """The placed corners of faces of the scene, (k, 3, 3)."""
+        corners = np.empty((len(faces), 3, 3))
+        corners_of_faces(self.top.descriptor, np.ascontiguousarray(faces), corners)
+        return corners
+
+
+def matrices_of(member: Member, instances: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The transforms in the records of a member's instances, (k, 3, 4)."""
+    own = instances[member.begin : member.begin + member.count, MATRIX : MATRIX + 12].reshape(-1, 3, 4).copy()
+    own[:, :, :3] *= member.built.tree.scale
+    return own
+
+
+def check_sizes(members: list[Member]) -> None:
+    """Raise ``ValueError`` for more faces than a scene can number."""
+    total = sum(m.count * len(m.built.mesh.faces) for m in members)
+    expect(total <= MOST_FACES, "scene", f"at most {MOST_FACES:,} faces, copies counted", f"{total:,}")
+    for member in members:
+        blocks = len(member.built.tree.faces) // 4
+        expect(blocks <= _MOST_BLOCKS, "mesh", f"at most {4 * _MOST_BLOCKS:,} faces", f"{4 * blocks:,}")
+
+
+def new_records(count: int) -> NDArray[np.float64]:
+    """Memory for the records of instances."""
+    return np.zeros((count, INSTANCE_WORDS))
+
+
+def number_faces(members: list[Member], instances: NDArray[np.float64]) -> None:
+    """Write the number of the first face of each instance, and the address of its object."""
+    words, first = instances.view(np.int64), 0
+    for m in members:
+        own = words[m.begin : m.begin + m.count]
+        faces = len(m.built.mesh.faces)
+        own[:, FIRST_FACE] = first + faces * np.arange(m.count)
+        first += faces * m.count

@@ -1,0 +1,417 @@
+"""Hits on a scene: which object, which of its instances, and which face of its mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from renderer.errors import expect
+from renderer.mesh.mesh import Mesh, face_normals
+from renderer.mesh.values import Owner, interpolated
+from renderer.rayscene.built import BuiltScene
+from renderer.results.closest_points import ClosestPoints
+from renderer.results.hits import AllHits, Hits, Passage
+
+Values = ArrayLike | Mapping[int, ArrayLike]
+
+
+class _Places:
+    """What hits on a scene have in common: places on faces of the scene, ``(...)`` or ``(m,)``."""
+
+    __slots__ = ()
+    face: NDArray[np.int64]
+    u: NDArray[np.float64]
+    v: NDArray[np.float64]
+    object: NDArray[np.int64]
+    _scene: BuiltScene
+    _all: NDArray[np.int64]
+    _mirrored: NDArray[np.bool_]
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """The hit points in the world, from the barycentrics, (..., 3) float64; nan on a miss.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> lifted = scene.add(box(), transforms=[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 5]])
+        >>> scene.closest_hit([0.5, 0.25, 9], [0, 0, -1]).points
+        array([0.5 , 0.25, 6.  ])
+        """
+        return self._on_hits(self._points, (3,))
+
+    @property
+    def normals(self) -> NDArray[np.float64]:
+        """The unit normals of the faces in the world, by the right-hand rule, (..., 3) float64; nan on a miss.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box())
+        >>> scene.closest_hit([0.5, 0.25, 9], [0, 0, -1]).normals
+        array([0., 0., 1.])
+        """
+        return self._on_hits(lambda hit: face_normals(self._scene.corners(self._all[hit])), (3,))
+
+    def _points(self, hit: NDArray[np.bool_]) -> NDArray[np.float64]:
+        corners = self._scene.corners(self._all[hit])
+        u, v = (weights[hit] for weights in self._placed_weights)
+        points: NDArray[np.float64] = (1.0 - u - v)[:, None] * corners[:, 0]
+        points += u[:, None] * corners[:, 1]
+        points += v[:, None] * corners[:, 2]
+        return points
+
+    @property
+    def _placed_weights(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """u and v on the placed faces, of which mirrored ones have their second and third corner swapped."""
+        return np.where(self._mirrored, self.v, self.u), np.where(self._mirrored, self.u, self.v)
+
+    def _on_hits(self, values: Callable[[NDArray[np.bool_]], NDArray[np.float64]], row: tuple[int, ...]) -> Any:
+        """An array of the values at hits, and nan elsewhere."""
+        hit = self.face >= 0
+        found = np.full((*self.face.shape, *row), np.nan)
+        found[hit] = values(hit)
+        return found
+
+    def interpolate(self, values: Values, *, on: Owner | None = None) -> NDArray[np.float64]:
+        """Return values of the meshes at the hits: interpolated between vertices, or those of the faces.
+
+        Parameters
+        ----------
+        values : array_like, or dict of int to array_like
+            For each object its values, as ``Hits.interpolate`` takes them; hits on other objects get nan. An array is
+            that of the only object.
+        on : {"vertices", "faces"}, optional
+            What the values belong to. Needed only if a mesh has as many vertices as faces.
+
+        Returns
+        -------
+        ndarray of float64, shape (..., ...)
+            The shape of the hits, then that of a row; nan on a miss.
+
+        Raises
+        ------
+        ValueError
+            For values that fit no object, or rows of different shapes.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box())
+        >>> hits = scene.closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1])
+        >>> hits.interpolate({cube: box().vertices[:, 0]})
+        array([0.5, nan])
+        """
+        meshes = {member.id: member.built.mesh for member in self._scene.members}
+        given = _by_object(values, meshes)
+        found: NDArray[np.float64] | None = None
+        for object_, rows in given.items():
+            own = self.object == object_
+            at = interpolated(meshes[object_], self.face[own], self.u[own], self.v[own], rows, on)
+            if found is None:
+                found = np.full((*self.face.shape, *at.shape[1:]), np.nan)
+            expect(found.shape[self.face.ndim :] == at.shape[1:], "values", "rows of one shape", f"{at.shape[1:]}")
+            found[own] = at
+        return np.full(self.face.shape, np.nan) if found is None else found
+
+    def take(self, values: Values) -> NDArray[np.float64]:
+        """Return values of the faces that were hit, as ``interpolate`` with ``on="faces"``.
+
+        Parameters
+        ----------
+        values : array_like, or dict of int to array_like
+            A row for each face of each object.
+
+        Returns
+        -------
+        ndarray of float64, shape (..., ...)
+            nan on a miss.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box())
+        >>> scene.closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1]).take(range(12))
+        array([10., nan])
+        """
+        return self.interpolate(values, on="faces")
+
+    @property
+    def colors(self) -> NDArray[np.float64]:
+        """The vertex colours at the hits, (..., 3) float64; nan on a miss, and on meshes without colours.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box())
+        >>> scene.closest_hit([0.5, 0.25, 3], [0, 0, -1]).colors
+        array([nan, nan, nan])
+        """
+        return self._attribute(lambda mesh: mesh.colors, 3)
+
+    @property
+    def texcoords(self) -> NDArray[np.float64]:
+        """The texture coordinates at the hits, (..., 2) float64; nan on a miss, and on meshes without them.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box())
+        >>> scene.closest_hit([0.5, 0.25, 3], [0, 0, -1]).texcoords
+        array([nan, nan])
+        """
+        return self._attribute(lambda mesh: mesh.texcoords, 2)
+
+    def _attribute(self, of: Callable[[Mesh], Any], width: int) -> NDArray[np.float64]:
+        meshes = {member.id: member.built.mesh for member in self._scene.members}
+        values = {id_: of(mesh) for id_, mesh in meshes.items() if of(mesh) is not None}
+        if not values:
+            return np.full((*self.face.shape, width), np.nan)
+        return self.interpolate(values, on="vertices")
+
+
+def _by_object(values: Values, meshes: dict[int, Mesh]) -> dict[int, Any]:
+    """Values for each object."""
+    if isinstance(values, Mapping):
+        unknown = [key for key in values if key not in meshes]
+        expect(not unknown, "values", f"objects of the scene, {sorted(meshes)}", unknown)
+        return dict(values)
+    expect(len(meshes) == 1, "values", "a dict of object to values, in a scene of several objects", "one array")
+    return {next(iter(meshes)): values}
+
+
+@dataclass(eq=False)
+class SceneHits(_Places):
+    """Closest hits on a scene. Their shape (...) is that of the rays.
+
+    Attributes
+    ----------
+    t : ndarray of float64, shape (...)
+        Distance in units of ``|direction|``; inf on a miss.
+    object : ndarray of int64, shape (...)
+        The object, as ``RayScene.add`` numbers it; -1 on a miss.
+    instance : ndarray of int64, shape (...)
+        Which of the object's instances; -1 on a miss.
+    face : ndarray of int64, shape (...)
+        The face of the object's mesh; -1 on a miss.
+    u, v : ndarray of float64, shape (...)
+        Barycentrics on the face of the object's mesh: the point is (1 - u - v) p0 + u p1 + v p2, placed; nan on a miss.
+    side : ndarray of int64, shape (...)
+        The side of the face that the ray came from: 1 that of its normal, -1 the other; 0 on a miss.
+    t_error : ndarray of float64, shape (...), or None
+        How far rounding may have moved t; nan on a miss. None without ``t_error=True``.
+
+    Examples
+    --------
+    >>> from renderer import RayScene
+    >>> from renderer.mesh.shapes import box
+    >>> scene = RayScene()
+    >>> cubes = scene.add(box(), transforms=[[[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 0]] for x in (0, 3)])
+    >>> hits = scene.closest_hit([[0.5, 0.25, 3], [3.5, 0.25, 3], [9, 9, 9]], [0, 0, -1])
+    >>> hits.object, hits.instance, hits.face
+    (array([ 0,  0, -1]), array([ 0,  1, -1]), array([10, 10, -1]))
+    """
+
+    t: NDArray[np.float64]
+    object: NDArray[np.int64]
+    instance: NDArray[np.int64]
+    face: NDArray[np.int64]
+    u: NDArray[np.float64]
+    v: NDArray[np.float64]
+    side: NDArray[np.int64]
+    t_error: NDArray[np.float64] | None
+    _scene: BuiltScene = field(repr=False)
+    # Faces and piles among all faces of the scene.
+    _all: NDArray[np.int64] = field(repr=False)
+    _pile: NDArray[np.int64] = field(repr=False)
+    _mirrored: NDArray[np.bool_] = field(repr=False)
+
+    @classmethod
+    def of(cls, hits: Hits, scene: BuiltScene) -> SceneHits:
+        """The hits on the faces of a scene as hits on its objects."""
+        at = scene.located(hits.face)
+        u, v = np.where(at.mirrored, hits.v, hits.u), np.where(at.mirrored, hits.u, hits.v)
+        assert hits.side is not None and hits._pile is not None  # as ``closest_hits`` makes them
+        return cls(
+            hits.t, at.object, at.instance, at.face, u, v, hits.side, hits.t_error, scene, hits.face, hits._pile,
+            at.mirrored,
+        )  # fmt: skip
+
+    @property
+    def hit(self) -> NDArray[np.bool_]:
+        """Whether each ray hit a face, (...) bool.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box())
+        >>> scene.closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1]).hit
+        array([ True, False])
+        """
+        return self.face >= 0
+
+    @property
+    def on_faces(self) -> Hits:
+        """The same on faces of the scene, as ``leaving`` takes them."""
+        u, v = self._placed_weights
+        mesh: Any = self._scene
+        return Hits(self.t, self._all, u, v, mesh, self.t_error, self.side, self._pile)
+
+    def through(self) -> Passage:
+        """Return the same places for rays that go on through the faces: ``leaving=hits.through()``.
+
+        Returns
+        -------
+        Passage
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box())
+        >>> hits = scene.closest_hit([[0.5, 0.25, 3.0]], [[0, 0, -1]])
+        >>> scene.closest_hit(hits.points, [[0, 0, -1]], leaving=hits.through()).t
+        array([1.])
+        """
+        return self.on_faces.through()
+
+
+@dataclass(eq=False)
+class SceneAllHits(_Places):
+    """All hits of n rays on a scene, m in all; those of ray i are the rows offsets[i] to offsets[i + 1].
+
+    The hits of a ray are sorted by t, then by object, instance and face.
+
+    Attributes
+    ----------
+    offsets : ndarray of int64, shape (n + 1,)
+        Where the hits of each ray begin; from 0 to m.
+    t : ndarray of float64, shape (m,)
+        Distance in units of ``|direction|``.
+    object, instance, face, u, v, side, t_error
+        As in ``SceneHits``, shape (m,).
+
+    Examples
+    --------
+    >>> from renderer import RayScene
+    >>> from renderer.mesh.shapes import box
+    >>> scene = RayScene()
+    >>> cubes = scene.add(box(), transforms=[[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, z]] for z in (0, 4)])
+    >>> hits = scene.all_hits([[0.5, 0.25, 9], [5, 5, 5]], [0, 0, -1])
+    >>> hits.t, hits.instance, hits.counts
+    (array([4., 5., 8., 9.]), array([1, 1, 0, 0]), array([4, 0]))
+    """
+
+    offsets: NDArray[np.int64]
+    t: NDArray[np.float64]
+    object: NDArray[np.int64]
+    instance: NDArray[np.int64]
+    face: NDArray[np.int64]
+    u: NDArray[np.float64]
+    v: NDArray[np.float64]
+    side: NDArray[np.int64]
+    t_error: NDArray[np.float64] | None
+    _scene: BuiltScene = field(repr=False)
+    _all: NDArray[np.int64] = field(repr=False)
+    _mirrored: NDArray[np.bool_] = field(repr=False)
+    _shape: tuple[int, ...] = field(repr=False)
+
+    @classmethod
+    def of(cls, hits: AllHits, scene: BuiltScene) -> SceneAllHits:
+        """The hits on the faces of a scene as hits on its objects."""
+        at = scene.located(hits.face)
+        u, v = np.where(at.mirrored, hits.v, hits.u), np.where(at.mirrored, hits.u, hits.v)
+        assert hits.side is not None  # as ``all_hits`` makes them
+        return cls(
+            hits.offsets, hits.t, at.object, at.instance, at.face, u, v, hits.side, hits.t_error, scene, hits.face,
+            at.mirrored, hits._shape,
+        )  # fmt: skip
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """The number of hits of each ray, in the shape of the rays, (...) int64.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box())
+        >>> scene.all_hits([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1]).counts
+        array([2, 0])
+        """
+        return np.diff(self.offsets).reshape(self._shape)
+
+    @property
+    def ray(self) -> NDArray[np.int64]:
+        """The ray of each hit, (m,) int64. Rays of several dimensions are counted in C order.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box())
+        >>> scene.all_hits([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1]).ray
+        array([0, 0])
+        """
+        return np.repeat(np.arange(len(self.offsets) - 1), np.diff(self.offsets))
+
+
+@dataclass(eq=False)
+class SceneClosestPoints(_Places):
+    """The nearest point of a scene to each of some points. The shape (...) is that of the points.
+
+    Attributes
+    ----------
+    distance : ndarray of float64, shape (...)
+        inf if nothing is within ``max_distance``.
+    object, instance, face, u, v
+        As in ``SceneHits``, shape (...).
+
+    Examples
+    --------
+    >>> from renderer import RayScene
+    >>> from renderer.mesh.shapes import box
+    >>> scene = RayScene()
+    >>> cube = scene.add(box())
+    >>> near = scene.closest_point([[0.5, 0.25, 3], [5, 5, 5]], max_distance=4)
+    >>> near.distance, near.object
+    (array([ 2., inf]), array([ 0, -1]))
+    """
+
+    distance: NDArray[np.float64]
+    object: NDArray[np.int64]
+    instance: NDArray[np.int64]
+    face: NDArray[np.int64]
+    u: NDArray[np.float64]
+    v: NDArray[np.float64]
+    _scene: BuiltScene = field(repr=False)
+    _all: NDArray[np.int64] = field(repr=False)
+    _mirrored: NDArray[np.bool_] = field(repr=False)
+
+    @classmethod
+    def of(cls, near: ClosestPoints, scene: BuiltScene) -> SceneClosestPoints:
+        """The nearest points on faces of a scene as those on its objects."""
+        at = scene.located(near.face)
+        u, v = np.where(at.mirrored, near.v, near.u), np.where(at.mirrored, near.u, near.v)
+        return cls(near.distance, at.object, at.instance, at.face, u, v, scene, near.face, at.mirrored)

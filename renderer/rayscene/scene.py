@@ -1,0 +1,375 @@
+"""``RayScene``: many meshes, each placed many times, with the queries of ``Octree``."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from threading import RLock
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.arguments.arrays import real_argument
+from renderer.arguments.types import ArrayLike
+from renderer.errors import expect
+from renderer.mesh.foreign import TriangleMesh
+from renderer.mesh.mesh import Mesh
+from renderer.octree import Octree, as_mesh
+from renderer.queryable import Queries
+from renderer.rayscene.built import (
+    BuiltScene,
+    Member,
+    SceneTree,
+    check_sizes,
+    matrices_of,
+    new_records,
+    number_faces,
+)
+from renderer.rayscene.placing import place
+from renderer.rayscene.queries import SceneQueries
+from renderer.system.threads import checked_threads
+from renderer.trace.instances import FLAGS, HIDDEN, MASK_BITS, OBJECT
+
+_IDENTITY = np.eye(4)[:3]
+
+
+class RayScene(SceneQueries):
+    """Many meshes, each placed many times, with the queries of ``Octree``.
+
+    A scene answers bit for bit like the one mesh that its placed meshes make together, in the order of objects,
+    instances and faces: corners as ``Mesh.transformed`` places them, and equal t by that order. Its memory grows by
+    the meshes, and some 290 bytes for each instance.
+
+    Parameters
+    ----------
+    threads : int, optional
+        Threads of queries; None for all processors. Results do not depend on it.
+
+    Examples
+    --------
+    >>> from renderer import RayScene
+    >>> from renderer.mesh.shapes import box, icosphere
+    >>> scene = RayScene()
+    >>> ground = scene.add(box((-9, -9, -1), (9, 9, 0)))
+    >>> balls = scene.add(icosphere(4), transforms=[[[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 1]] for x in (-2, 2)])
+    >>> hits = scene.closest_hit([[2.1, 0.1, 9], [0, 0, 9]], [0, 0, -1])
+    >>> hits.object, hits.instance, hits.t.round(1)
+    (array([1, 0]), array([1, 0]), array([7., 9.]))
+    """
+
+    def __init__(self, *, threads: int | None = None) -> None:
+        self.threads = checked_threads(threads)
+        self._lock = RLock()
+        self._members: list[Member] = []
+        self._instances = new_records(0)
+        self._snapshot: BuiltScene | None = None
+        self._next = 0
+
+    def __repr__(self) -> str:
+        built = self._built
+        instances = sum(m.count for m in built.members)
+        return f"<RayScene of {len(built.members):,} objects, {instances:,} instances, {built.count:,} faces>"
+
+    def add(
+        self,
+        mesh: Octree | Mesh | str | os.PathLike[str] | TriangleMesh,
+        transforms: ArrayLike | None = None,
+        *,
+        mask: ArrayLike = MASK_BITS,
+        name: str | None = None,
+    ) -> int:
+        """Add an object: a mesh, placed once or many times. Nothing of it is copied.
+
+        Parameters
+        ----------
+        mesh : Octree, Mesh, str, path or trimesh.Trimesh
+            An octree is shared as it is now; of anything else one is built.
+        transforms : array_like, shape (3, 4), (4, 4), (k, 3, 4) or (k, 4, 4), optional
+            Where it stands, applied to column vectors: one instance, or k. None leaves it where it is.
+        mask : array_like of int, shape () or (k,), default all bits
+            32 bits: a ray meets an instance if its own mask has one of them too.
+        name : str, optional
+            The name of the object; None for that of the mesh.
+
+        Returns
+        -------
+        int
+            The object's number, by which hits and the other methods name it.
+
+        Raises
+        ------
+        MeshError
+            For a mesh that cannot be used.
+        ValueError
+            For a matrix that is singular or nearly so, which is named by its row, and for any other argument.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> scene.add(box()), scene.add(box(), transforms=[[1, 0, 0, 2], [0, 1, 0, 0], [0, 0, 1, 0]])
+        (0, 1)
+        """
+        octree = mesh if isinstance(mesh, Octree) else Octree(as_mesh(mesh, None, False)[0], threads=self.threads)
+        built = octree._built
+        matrices = _matrices(transforms)
+        with self._lock:
+            begin = len(self._instances)
+            member = Member(self._next, built.mesh.name if name is None else name, built, begin, len(matrices))
+            members = [*self._members, member]
+            check_sizes(members)
+            own = new_records(len(matrices))
+            own.view(np.int64)[:, FLAGS] = _masks(mask, len(matrices))
+            _place(member, own, matrices)
+            self._change(members, np.concatenate([self._instances, own]))
+            self._next += 1
+            return member.id
+
+    def move(self, object: int, transforms: ArrayLike, *, instances: ArrayLike | None = None) -> None:
+        """Place the instances of an object anew. A query that runs meanwhile sees the scene before or after.
+
+        Parameters
+        ----------
+        object : int
+        transforms : array_like, shape (3, 4), (4, 4), (k, 3, 4) or (k, 4, 4)
+            As for ``add``, one for each instance that is moved.
+        instances : array_like of int, shape (k,), optional
+            Which instances; None for all.
+
+        Raises
+        ------
+        ValueError
+            For a bad argument; nothing is changed then.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box())
+        >>> scene.move(cube, [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 5]])
+        >>> scene.closest_hit([0.5, 0.25, 9], [0, 0, -1]).t
+        array(3.)
+        """
+        matrices = _matrices(transforms)
+        with self._lock:
+            member = self._member(object)
+            rows = _rows(instances, member.count)
+            expect(len(matrices) == len(rows), "transforms", f"{len(rows)} matrices", f"{len(matrices)}")
+            own = self._instances[member.begin + rows]
+            _place(member, own, matrices)
+            changed = self._writable()
+            changed[member.begin + rows] = own
+            self._change(self._members, changed)
+
+    def refit(self, object: int, vertices: ArrayLike) -> None:
+        """Move the vertices of an object's mesh, as ``Octree.refit`` does; an octree that was added stays as it was.
+
+        Parameters
+        ----------
+        object : int
+        vertices : array_like, shape (V, 3)
+
+        Raises
+        ------
+        MeshError
+            For other arrays; nothing is changed then.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box())
+        >>> scene.refit(cube, box().vertices * 2)
+        >>> scene.closest_hit([0.5, 0.25, 9], [0, 0, -1]).t
+        array(7.)
+        """
+        with self._lock:
+            member = self._member(object)
+            octree = Octree.__new__(Octree)
+            Queries.__init__(octree, *member.built, self.threads)
+            octree.refit(vertices)
+            refitted = replace(member, built=octree._built)
+            own = self._instances[member.begin : member.begin + member.count].copy()
+            _place(refitted, own, matrices_of(member, self._instances))
+            changed = self._writable()
+            changed[member.begin : member.begin + member.count] = own
+            self._change([refitted if m.id == object else m for m in self._members], changed)
+
+    def show(self, object: int, shown: ArrayLike = True) -> None:
+        """Show instances of an object or hide them: hidden ones are met by no ray. Numbers stay as they are.
+
+        Parameters
+        ----------
+        object : int
+        shown : array_like of bool, shape () or (k,), default True
+
+        Raises
+        ------
+        ValueError
+            For a bad argument.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box())
+        >>> scene.show(cube, False)
+        >>> scene.any_hit([0.5, 0.25, 9], [0, 0, -1])
+        array(False)
+        """
+        with self._lock:
+            member = self._member(object)
+            given = np.asarray(shown)
+            fits = given.dtype == np.bool_ and given.shape in ((), (member.count,))
+            expect(fits, "shown", f"a bool or {member.count} bools", f"{given.dtype} of shape {given.shape}")
+            changed = self._writable()
+            flags = changed.view(np.int64)[member.begin : member.begin + member.count, FLAGS]
+            flags[:] = np.where(given, flags & ~HIDDEN, flags | HIDDEN)
+            self._change(self._members, changed)
+
+    def remove(self, object: int) -> None:
+        """Take an object out of the scene. The numbers of others stay.
+
+        Parameters
+        ----------
+        object : int
+
+        Raises
+        ------
+        ValueError
+            If the scene has no such object.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box())
+        >>> scene.remove(cube)
+        >>> scene
+        <RayScene of 0 objects, 0 instances, 0 faces>
+        """
+        with self._lock:
+            gone = self._member(object)
+            kept = np.delete(self._instances, np.s_[gone.begin : gone.begin + gone.count], axis=0)
+            members = [
+                replace(m, begin=m.begin - gone.count) if m.begin > gone.begin else m
+                for m in self._members
+                if m.id != object
+            ]
+            self._change(members, kept)
+
+    @property
+    def objects(self) -> list[int]:
+        """The numbers of the objects, in order.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box(), name="cube")
+        >>> scene.objects, scene.name(cube), len(scene.mesh(cube).faces), scene.transforms(cube).shape
+        ([0], 'cube', 12, (1, 3, 4))
+        """
+        return [m.id for m in self._members]
+
+    def name(self, object: int) -> str:
+        """Return the name of an object."""
+        return self._member(object).name
+
+    def mesh(self, object: int) -> Mesh:
+        """Return the mesh of an object, to which ``face`` of a hit refers."""
+        return self._member(object).built.mesh
+
+    def transforms(self, object: int) -> NDArray[np.float64]:
+        """Return where the instances of an object stand, (k, 3, 4)."""
+        built = self._built
+        return next(built.matrices(m) for m in built.members if m.id == self._member(object).id)
+
+    @property
+    def merged(self) -> Mesh:
+        """The one mesh that the placed meshes make together, with a part for each instance.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cubes = scene.add(box(), transforms=[[[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 0]] for x in (0, 3)])
+        >>> len(scene.merged.faces), scene.merged.bounds[1].tolist()
+        (24, [4.0, 1.0, 1.0])
+        """
+        return self._built.merged.mesh
+
+    @property
+    def _built(self) -> BuiltScene:
+        """The scene as it is now, ready for queries."""
+        built = self._snapshot
+        if built is None:
+            with self._lock:
+                built = self._snapshot
+                if built is None:
+                    number_faces(self._members, self._instances)
+                    tree = SceneTree(self._members, self._instances, self.threads)
+                    built = self._snapshot = BuiltScene(self._members, tree, self.threads)
+        return built
+
+    def _member(self, object: int) -> Member:
+        for member in self._members:
+            if member.id == object:
+                return member
+        expect(False, "object", f"one of {[m.id for m in self._members]}", repr(object))
+        raise AssertionError
+
+    def _writable(self) -> NDArray[np.float64]:
+        """The records of all instances, not those that a snapshot has."""
+        return self._instances if self._snapshot is None else self._instances.copy()
+
+    def _change(self, members: list[Member], instances: NDArray[np.float64]) -> None:
+        self._members, self._instances, self._snapshot = members, instances, None
+
+
+def _place(member: Member, records: NDArray[np.float64], matrices: NDArray[np.float64]) -> None:
+    """Write the records of instances of a member. Raises ``ValueError`` naming the instance that cannot be placed."""
+    words = records.view(np.int64)
+    words[:, OBJECT] = member.row.ctypes.data
+    bad = place(matrices, records, words, 0, len(records))
+    expect(bad < 0, "transforms", "matrices that can be inverted", f"{matrices[bad].tolist()} for instance {bad}")
+
+
+def _matrices(transforms: ArrayLike | None) -> NDArray[np.float64]:
+    """Transforms as (k, 3, 4) float64."""
+    given = _IDENTITY if transforms is None else real_argument("transforms", transforms)
+    fits = given.ndim in (2, 3) and given.shape[-2:] in ((3, 4), (4, 4))
+    expect(fits, "transforms", "shape (3, 4), (4, 4), (k, 3, 4) or (k, 4, 4)", f"shape {given.shape}")
+    with np.errstate(over="ignore", invalid="ignore"):  # what float64 cannot hold is rejected just below
+        matrices = np.array(given, np.float64).reshape(-1, *given.shape[-2:])
+    good = np.isfinite(matrices).all(axis=(1, 2))
+    if matrices.shape[1] == 4:
+        good &= (matrices[:, 3] == [0.0, 0.0, 0.0, 1.0]).all(axis=1)
+    if not good.all():
+        row = int((~good).argmax())
+        expect(False, "transforms", "finite matrices, the last row 0 0 0 1", f"{matrices[row].tolist()} in row {row}")
+    return np.ascontiguousarray(matrices[:, :3])
+
+
+def _masks(mask: ArrayLike, count: int) -> NDArray[np.int64]:
+    masks = real_argument("mask", mask)
+    fits = masks.dtype.kind in "iu" and masks.shape in ((), (count,))
+    expect(fits, "mask", f"an integer or {count} integers", f"{masks.dtype} of shape {masks.shape}")
+    expect(bool(((masks >= 0) & (masks <= MASK_BITS)).all()), "mask", "32 bits", masks.tolist())
+    return np.broadcast_to(masks, (count,)).astype(np.int64)
+
+
+def _rows(instances: ArrayLike | None, count: int) -> NDArray[np.int64]:
+    if instances is None:
+        return np.arange(count)
+    rows = real_argument("instances", instances).reshape(-1)
+    fits = rows.dtype.kind in "iu" and ((rows >= 0) & (rows < count)).all() and len(np.unique(rows)) == len(rows)
+    expect(bool(fits), "instances", f"different integers from 0 to {count - 1}", rows.tolist()[:10])
+    return rows.astype(np.int64)

@@ -1,0 +1,105 @@
+"""The rays of a query on a scene: which instances each may hit, and which face it leaves."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.arguments.types import ArrayLike
+from renderer.errors import expect
+from renderer.mesh.mesh import Mesh
+from renderer.rayscene.built import BuiltScene
+from renderer.rayscene.hits import SceneHits
+from renderer.results.hits import Hits, Passage
+from renderer.trace.batch import ALL, NO_STARTS, RayBatch, check_rays, offset_origins, whole_numbers
+from renderer.trace.instances import MASK_BITS
+from renderer.trace.leaving import check_leaving, shapes_of_starts
+from renderer.trace.starts.record import FACE, HEAD, IGNORED, MASK, ROW, ROW_STEP
+
+Leaving = SceneHits | Passage | None
+
+
+class Choice(NamedTuple):
+    """The arguments of a query that say what each ray may hit."""
+
+    leaving: Leaving
+    mask: ArrayLike
+    ignore: SceneHits | ArrayLike | None
+
+
+def rays_of(
+    scene: BuiltScene, origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike, t_max: ArrayLike, choice: Choice
+) -> tuple[RayBatch, tuple[int, ...]]:
+    """The arguments of a query, checked, and the dimensions of the rays."""
+    leaving, ignored = _on_faces(scene, choice.leaving), _ignored(scene, choice.ignore)
+    shapes = shapes_of_starts(leaving, None) if leaving is not None else {}
+    mask = np.asarray(choice.mask)
+    shapes |= {"mask": mask.shape, **({} if ignored is None else {"ignore": ignored.shape})}
+    rays, shape = check_rays(origins, directions, t_min, t_max, shapes)
+    count, masks = rays.number, _masks(mask, shape)
+    if leaving is not None:
+        rays = _leave(scene, rays, leaving, shape)
+    elif ignored is not None or (masks != ALL).any():
+        rows = count if ignored is not None or len(masks) > 1 else 1
+        starts = np.zeros(HEAD + ROW * rows, np.int64)
+        starts[ROW_STEP] = ROW if rows > 1 else 0
+        rays = rays._replace(starts=starts)
+        _rows(rays)[:, FACE] = -1.0
+    if rays.starts is not NO_STARTS:
+        _rows(rays)[:, MASK] = masks
+        _rows(rays)[:, IGNORED] = -1.0 if ignored is None else np.broadcast_to(ignored, shape).reshape(-1)
+    return rays, shape
+
+
+def _rows(rays: RayBatch) -> NDArray[np.float64]:
+    return rays.starts[HEAD:].view(np.float64).reshape(-1, ROW)
+
+
+def _on_faces(scene: BuiltScene, leaving: Leaving) -> Hits | Passage | None:
+    if isinstance(leaving, SceneHits):
+        expect(leaving._scene is scene, "leaving", "hits on the scene as it is", "hits from before it changed")
+        return leaving.on_faces
+    expect(leaving is None or isinstance(leaving, Passage), "leaving", "hits of a scene", type(leaving).__name__)
+    return leaving
+
+
+def _masks(mask: NDArray[Any], shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """The mask of each ray, or of all, as float64."""
+    rows = whole_numbers("mask", mask, shape).reshape(-1) if mask.ndim else whole_numbers("mask", mask, ()).reshape(1)
+    good = (rows >= 0) & (rows <= MASK_BITS)
+    if not good.all():
+        row = int((~good).argmax())
+        expect(False, "mask", "32 bits", f"{rows[row]} in row {row}")
+    return rows.astype(np.float64)
+
+
+def _ignored(scene: BuiltScene, ignore: SceneHits | ArrayLike | None) -> NDArray[np.float64] | None:
+    """The instance, counted from 1 among all, that each ray does not hit, (...); -1 for none."""
+    if ignore is None:
+        return None
+    expect(isinstance(ignore, SceneHits), "ignore", "hits of a scene", type(ignore).__name__)
+    assert isinstance(ignore, SceneHits)
+    begins = {m.id: (m.begin, m.count) for m in scene.members}
+    ignored = np.full(ignore.object.shape, -1.0)
+    for id_ in np.unique(ignore.object[ignore.object >= 0]).tolist():
+        if id_ in begins:
+            own, (begin, count) = ignore.object == id_, begins[id_]
+            expect(int(ignore.instance[own].max()) < count, "ignore", f"instances below {count}", "others")
+            ignored[own] = ignore.instance[own] + begin + 1
+    return ignored
+
+
+def _leave(scene: BuiltScene, rays: RayBatch, leaving: Hits | Passage, shape: tuple[int, ...]) -> RayBatch:
+    """The rays moved off the faces that they leave."""
+    left = check_leaving(leaving, None, shape, scene.count)
+    leaves = left.faces >= 0
+    corners = scene.corners(left.faces[leaves])
+    # The faces that rays leave as a mesh of their own; the kernels look up all others in the scene.
+    faces = np.full(len(left.faces), -1)
+    faces[leaves] = np.arange(len(corners))
+    own = Mesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+    moved = offset_origins(rays, left._replace(faces=faces), own, 1.0, scene.threads)
+    _rows(moved)[:, FACE] = left.faces
+    return moved

@@ -1,0 +1,480 @@
+"""How kernels read a scene: meshes that stand in it many times, each time placed by a matrix.
+
+    top's nodes --+-- instance 1 -- nodes of its mesh -- blocks, placed when they are read
+                  +-- instance 2 -- nodes of the same mesh ...
+
+A scene answers bit for bit like the one mesh that its placed meshes make together. Corners are placed on the fly, as
+``Mesh.transformed`` places them, and tested in the world by the tests of any mesh. Only boxes are entered in the mesh's
+own frame, by a ray that is turned into it. Boxes grow by what the rounding of that, and of the corners, may cost.
+
+A node, or a block, of a scene is one number: the instance above the NUMBER_BITS of its number in the mesh. Instance 0
+is the top, whose leaves are instances.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import (
+    double_of,
+    fabs,
+    float32_pointer,
+    float64_pointer,
+    int32_pointer,
+    int64_pointer,
+    load,
+    load4,
+    load8,
+    local_floats,
+    maximum,
+    narrow,
+    offset,
+    pointer,
+    prefetch,
+    select,
+    splat8,
+    store,
+)
+from renderer.numerics.vec3 import row3, scale
+from renderer.trace.intersect import Slabs, enter_boxes, largest_of, make_slab, make_slabs, room_of
+from renderer.trace.layout import (
+    BLOCK_WORDS,
+    BLOCKS,
+    CACHE_LINE,
+    CHILDREN,
+    FACES,
+    LEAF_BITS,
+    NODE_WORDS,
+    NODES,
+    SCALE,
+    TREE_WORDS,
+    WIDE,
+)
+from renderer.trace.ray_lanes import (
+    CHILD,
+    LIMIT,
+    NUMBER,
+    TOP,
+    WIDTH,
+    put_slabs,
+)
+from renderer.trace.rays import ray_at
+from renderer.trace.stack_entry import child_of_entry, distance_of
+from renderer.trace.starts.record import IGNORED, MASK
+from renderer.trace.stream import END
+from renderer.trace.ways import Ways
+
+# An object, int64: a tree as in ``layout``; the addresses of its mesh's vertices and faces; and, as float64 in the
+# tree's units, the middle and the half of its mesh's box.
+VERTICES, MESH_FACES, MIDDLE, HALF, OBJECT_WORDS = (TREE_WORDS + k for k in (0, 1, 2, 5, 8))
+# An instance, float64: the matrix that places a block's corners, three rows of four; the inverse of its linear part;
+# the placed middle of the mesh; how far, in the mesh's units, rounding may move what is placed; and as int64 the
+# address of its object, the number of the first of its faces, and its flags.
+MATRIX, INVERSE, PLACE, ROOM, OBJECT, FIRST_FACE, FLAGS, INSTANCE_WORDS = 0, 12, 21, 24, 27, 28, 29, 30
+# The bits of flags: the mask below, whether the matrix mirrors, and whether no ray sees the instance.
+MIRRORS, HIDDEN = 1 << 32, 1 << 33
+MASK_BITS = (1 << 32) - 1
+# A scene, as kernels get it, uint64: addresses of the top's nodes and of the instances, and their number.
+TOP_NODES, INSTANCES, INSTANCE_COUNT, SCENE_WORDS = range(4)
+
+# An instance in the number of a node or block, and of a slot, four times as large.
+NUMBER_BITS = 32
+_NUMBER = (1 << NUMBER_BITS) - 1
+_SLOT_BITS = NUMBER_BITS + 2
+# The entry on a ray's stack where it leaves an instance: the distance -inf, so that no limit passes over it.
+_LEAVE = END + 1
+_LEFT = (-0x800000 << 32) | (_LEAVE & 0xFFFFFFFF)
+# A hit that is uncertain, once resolved, is within 2^-22 of its distance of its face (``intersect.DOUBT``). Boxes grow
+# by four times as much, as the distance counts along each axis alone.
+DISTANCE_ROOM = 2.0**-20
+
+# The rows of lanes that meshes do not use.
+_INSTANCE, _NODES_AT, _BLOCKS_AT, _MASK, _IGNORED = (row * WIDTH for row in range(11, 16))
+# What the roundings of a placed box may cost, as a share of all that is added: eight roundings of float32.
+_BOX_ROOM, _TINY = np.float32(2.0**-20), np.float32(2.0**-149)
+_LINE = CACHE_LINE // 4
+
+
+class ScenePointers(NamedTuple):
+    """A scene as the traversal reads it: the nodes of its top, also as links and by their address; the instances as
+    float64 and as int64, and their number; room for a node's boxes; and the rest as of ``trees.TreePointers``.
+    """
+
+    nodes: Any
+    links: Any
+    top: int
+    instances: Any
+    words: Any
+    instance_count: int
+    boxes: Any
+    count: int  # type: ignore[assignment]  # tuples have a method of that name
+    has_nodes: bool
+    scale: float
+    ways: Ways
+
+
+@inlined
+def _are_coherent(rays, begin):
+    """Rays of a scene travel as a stream."""
+    return False
+
+
+@inlined
+def _instance(tree, number):
+    """Pointers to an instance, from 1 on, as float64 and as int64."""
+    at = (number - 1) * INSTANCE_WORDS
+    return offset(tree.instances, at), offset(tree.words, at)
+
+
+@inlined
+def _object(words):
+    """Pointer to the object of an instance, int64."""
+    return int64_pointer(load(words, OBJECT))
+
+
+@inlined
+def _middle(words):
+    """Pointer to the middle of the mesh of an instance."""
+    return offset(float64_pointer(load(words, OBJECT)), MIDDLE)
+
+
+@inlined
+def _nodes(object_):
+    """The address of an object's nodes."""
+    return load(object_, NODES)
+
+
+@inlined
+def _swapped(words):
+    """12 if the instance's matrix mirrors, else 0."""
+    return 12 * np.int64(load(words, FLAGS) & MIRRORS != 0)
+
+
+@inlined
+def _along(matrix, row, x, y, z):
+    """A placed coordinate, in the order of sums of ``Mesh.transformed``."""
+    m = offset(matrix, row)
+    # rule: placed-corner
+    return ((x * load(m, 0) + y * load(m, 1)) + z * load(m, 2)) + load(m, 3)
+
+
+@inlined
+def _corners(tree, base, rows):
+    number = (base // BLOCK_WORDS) >> NUMBER_BITS
+    local = base - number * (BLOCK_WORDS << NUMBER_BITS)
+    matrix, words = _instance(tree, number)
+    object_ = _object(words)
+    blocks = load(object_, BLOCKS)
+    swap = _swapped(words)
+    # rule: mirrored-corners
+    rows = _PlacedRows(matrix, rows.row_x, rows.row_y, rows.row_z, 12 + swap, 24 - swap)
+    if load(object_, WIDE) != 0:
+        return _placed_rows(float64_pointer(blocks), local, rows)
+    return _placed_rows(float32_pointer(blocks), local, rows)
+
+
+class _PlacedRows(NamedTuple):
+    """The matrix of an instance; its rows in the order of a ray's axes; and where the second and the third corner begin
+    in a block, which a matrix that mirrors swaps.
+    """
+
+    matrix: Any
+    row_x: int
+    row_y: int
+    row_z: int
+    second: int
+    third: int
+
+
+@inlined
+def _placed_rows(blocks, base, rows):
+    x0, y0, z0 = _placed_four(blocks, base, rows)
+    x1, y1, z1 = _placed_four(blocks, base + rows.second, rows)
+    x2, y2, z2 = _placed_four(blocks, base + rows.third, rows)
+    return x0, x1, x2, y0, y1, y2, z0, z1, z2
+
+
+@inlined
+def _placed_four(blocks, at, rows):
+    x, y, z = load4(blocks, at), load4(blocks, at + 4), load4(blocks, at + 8)
+    matrix = rows.matrix
+    return _along(matrix, rows.row_x, x, y, z), _along(matrix, rows.row_y, x, y, z), _along(matrix, rows.row_z, x, y, z)
+
+
+@inlined
+def _coordinate(tree, at):
+    number = (at // BLOCK_WORDS) >> NUMBER_BITS
+    local = at - number * (BLOCK_WORDS << NUMBER_BITS)
+    matrix, words = _instance(tree, number)
+    object_ = _object(words)
+    within = local % BLOCK_WORDS
+    corner, row, slot = within // 12, within % 12 // 4 * 4, within % 4
+    if corner > 0 and _swapped(words) != 0:
+        corner = 3 - corner
+    x, y, z = _block_corner(object_, local - within + 12 * corner + slot)
+    return _along(matrix, row, x, y, z)
+
+
+@inlined
+def _block_corner(object_, at):
+    blocks = load(object_, BLOCKS)
+    if load(object_, WIDE) != 0:
+        wide = float64_pointer(blocks)
+        return load(wide, at), load(wide, at + 4), load(wide, at + 8)
+    narrow_ = float32_pointer(blocks)
+    return np.float64(load(narrow_, at)), np.float64(load(narrow_, at + 4)), np.float64(load(narrow_, at + 8))
+
+
+@inlined
+def _face(tree, slot):
+    number = slot >> _SLOT_BITS
+    _, words = _instance(tree, number)
+    face = load(int32_pointer(load(_object(words), FACES)), slot & ((1 << _SLOT_BITS) - 1))
+    # rule: faces-of-scene
+    return np.int32(load(words, FIRST_FACE) + face) if face >= 0 else np.int32(-1)
+
+
+@inlined
+def _corners_of_face(tree, starts, face):
+    return corners_of_scene_face(tree, face)
+
+
+@kernel
+def corners_of_scene_face(tree, face):
+    """The placed corners of a face of the scene, as tuples."""
+    number = instance_with(tree.words, tree.instance_count, face)
+    matrix, words = _instance(tree, number)
+    object_ = _object(words)
+    vertices, unit = float64_pointer(load(object_, VERTICES)), double_of(load(object_, SCALE))
+    a, b, c = row3(int32_pointer(load(object_, MESH_FACES)), face - load(words, FIRST_FACE))
+    if _swapped(words) != 0:
+        b, c = c, b
+    return _placed(matrix, vertices, a, unit), _placed(matrix, vertices, b, unit), _placed(matrix, vertices, c, unit)
+
+
+@inlined
+def _placed(matrix, vertices, vertex, unit):
+    x, y, z = scale(row3(vertices, vertex), unit)
+    return _along(matrix, 0, x, y, z), _along(matrix, 4, x, y, z), _along(matrix, 8, x, y, z)
+
+
+@kernel
+def instance_with(words, count, face):
+    """The instance, from 1 on, that has a face of the scene: the last whose first face is not above it."""
+    low, high = np.int64(1), np.int64(count)
+    while low < high:
+        middle = (low + high + 1) // 2
+        if load(words, (middle - 1) * INSTANCE_WORDS + FIRST_FACE) <= face:
+            low = middle
+        else:
+            high = middle - 1
+    return low
+
+
+@inlined
+def _child(tree, node, octant):
+    number, local = node >> NUMBER_BITS, node & _NUMBER
+    if number == 0:
+        link = np.int64(load(tree.links, local * NODE_WORDS + CHILDREN + octant))
+        return link if link >= 0 else (~link + 1) << NUMBER_BITS
+    links = int32_pointer(_nodes(_object(_instance(tree, number)[1])))
+    return _in_scene(number, np.int64(load(links, local * NODE_WORDS + CHILDREN + octant)))
+
+
+@inlined
+def _in_scene(number, child):
+    """A child of a mesh's node as one of the scene."""
+    if child >= 0:
+        return (number << NUMBER_BITS) | child
+    return ~((number << (NUMBER_BITS + LEAF_BITS)) | ~child)
+
+
+@inlined
+def _boxes(tree, node):
+    number, local = node >> NUMBER_BITS, node & _NUMBER
+    if number == 0:
+        return tree.nodes, local * NODE_WORDS
+    matrix, words = _instance(tree, number)
+    place_boxes(matrix, words, local * NODE_WORDS, tree.boxes)
+    return tree.boxes, np.int64(0)
+
+
+@kernel
+def place_boxes(instance, words, base, boxes):
+    """Write boxes, as six rows of eight, around the placed boxes of a node of an instance's mesh."""
+    nodes, middle = float32_pointer(_nodes(_object(words))), _middle(words)
+    x, y, z = _extent(nodes, base, middle, 0), _extent(nodes, base, middle, 1), _extent(nodes, base, middle, 2)
+    none = load8(nodes, base) > load8(nodes, base + 8)
+    for k in range(3):
+        row = offset(instance, MATRIX + 4 * k)
+        a, b, c = narrow(load(row, 0)), narrow(load(row, 1)), narrow(load(row, 2))
+        place = splat8(narrow(load(instance, PLACE + k)))
+        centre = place + ((x.centre * splat8(a) + y.centre * splat8(b)) + z.centre * splat8(c))
+        half = (x.half * splat8(abs(a)) + y.half * splat8(abs(b))) + z.half * splat8(abs(c))
+        size = (x.size * splat8(abs(a)) + y.size * splat8(abs(b))) + z.size * splat8(abs(c)) + fabs(place)
+        half = half + size * splat8(_BOX_ROOM) + splat8(_TINY)
+        store(boxes, 16 * k, select(none, splat8(np.float32(np.inf)), centre - half))
+        store(boxes, 16 * k + 8, select(none, splat8(np.float32(-np.inf)), centre + half))
+
+
+class _Extent(NamedTuple):
+    """Eight boxes on one axis: their middles from that of the mesh, their halves, and a bound of all that is added."""
+
+    centre: Any
+    half: Any
+    size: Any
+
+
+@inlined
+def _extent(nodes, base, middle, axis):
+    low, high = load8(nodes, base + 16 * axis), load8(nodes, base + 16 * axis + 8)
+    m, two = splat8(narrow(load(middle, axis))), splat8(np.float32(0.5))
+    centre, half = (low + high) * two - m, (high - low) * two
+    return _Extent(centre, half, fabs(centre) + half + fabs(m))
+
+
+@inlined
+def _enter(tree, node, single, upper):
+    number, local, lower = node >> NUMBER_BITS, node & _NUMBER, single.lower
+    if number == 0:
+        return enter_boxes(tree.nodes, local * NODE_WORDS, single.slabs, lower, upper)
+    matrix, words = _instance(tree, number)
+    object_ = _object(words)
+    slabs = slabs_within(matrix, words, single.ray, single.largest)
+    distances, bits = enter_boxes(float32_pointer(_nodes(object_)), local * NODE_WORDS, slabs, lower, upper)
+    return distances, bits if _meets(words, number, single.ray.mask, single.ray.ignored) else bits & 0
+
+
+@inlined
+def _meets(words, number, mask, ignored):
+    """Whether a ray with that mask, which ignores one instance, may hit another."""
+    # rule: mask-of-ray
+    return np.int64(mask) & load(words, FLAGS) & MASK_BITS != 0 and np.int64(ignored) != number
+
+
+@inlined
+def slabs_within(instance, words, ray, largest):
+    """The ``Slabs`` of a ray in the frame of an instance's mesh; distances count as in the world."""
+    px, py, pz = (
+        ray.ox - load(instance, PLACE), ray.oy - load(instance, PLACE + 1), ray.oz - load(instance, PLACE + 2)
+    )  # fmt: skip
+    middle, slack = _middle(words), ray.slack if ray.slack < np.inf else 0.0
+    far = maximum(maximum(abs(px), abs(py)), abs(pz)) * DISTANCE_ROOM + slack
+    x = _slab_within(instance, middle, 0, (px, py, pz), ray, largest, far)
+    y = _slab_within(instance, middle, 1, (px, py, pz), ray, largest, far)
+    z = _slab_within(instance, middle, 2, (px, py, pz), ray, largest, far)
+    return Slabs(
+        x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2], x[3], y[3], z[3], x[4], y[4], z[4], x[5], y[5], z[5]
+    )  # fmt: skip
+
+
+@inlined
+def _slab_within(instance, middle, axis, p, ray, largest, far):
+    """``make_slab`` along an axis of the mesh."""
+    row = offset(instance, INVERSE + 3 * axis)
+    a, b, c = load(row, 0), load(row, 1), load(row, 2)
+    o = load(middle, axis) + ((a * p[0] + b * p[1]) + c * p[2])
+    d = (a * ray.dx + b * ray.dy) + c * ray.dz
+    # rule: room-of-instance
+    room = load(instance, ROOM + axis) + ((abs(a) + abs(b)) + abs(c)) * far
+    return make_slab(axis, o, d, largest, room_of(room))
+
+
+@inlined
+def _begin(tree, rays, prepared, r, number):
+    row = offset(rays.starts.rows, number * rays.starts.step)
+    store(prepared.integers, _INSTANCE + r, 0)
+    store(prepared.integers, _NODES_AT + r, tree.top)
+    store(prepared.integers, _MASK + r, np.int64(load(row, MASK)))
+    store(prepared.integers, _IGNORED + r, np.int64(load(row, IGNORED)))
+
+
+@inlined
+def _node_of(tree, prepared, r):
+    nodes, node = load(prepared.integers, _NODES_AT + r), load(prepared.integers, CHILD + r) & _NUMBER
+    return float32_pointer(nodes), int32_pointer(nodes), node * NODE_WORDS
+
+
+@kernel
+def _resume(tree, rays, prepared, lanes, r):
+    # rule: resume-in-scene
+    integers, limit = prepared.integers, load(prepared.floats, LIMIT + r)
+    top, number = load(integers, TOP + r), load(integers, _INSTANCE + r)
+    while True:
+        top -= 1
+        entry = load(lanes.stacks, top)
+        if distance_of(entry) > limit:
+            continue
+        child = child_of_entry(entry)
+        if child == END:
+            break
+        if child == _LEAVE:
+            ray, _ = ray_at(rays, load(integers, NUMBER + r))
+            put_slabs(prepared, r, make_slabs(ray, largest_of(ray)))
+            number = np.int64(0)
+            store(integers, _NODES_AT + r, tree.top)
+            continue
+        if number == 0 and child < 0:
+            if not _may_hit(tree, prepared, r, ~child + 1):
+                continue
+            number = ~child + 1
+            store(lanes.stacks, top, _LEFT)
+            top += 1
+            _enter_instance(tree, rays, prepared, r, number)
+            child = np.int64(0)
+        if number > 0:
+            child = _in_scene(number, child)
+        break
+    store(integers, _INSTANCE + r, number)
+    store(integers, CHILD + r, child)
+    store(integers, TOP + r, top)
+    if child != END:
+        _prefetch(tree, prepared, r, child)
+    return child
+
+
+@inlined
+def _may_hit(tree, prepared, r, number):
+    _, words = _instance(tree, number)
+    return _meets(words, number, load(prepared.integers, _MASK + r), load(prepared.integers, _IGNORED + r))
+
+
+@inlined
+def _enter_instance(tree, rays, prepared, r, number):
+    """Turn the ray in lane ``r`` into the frame of an instance's mesh."""
+    ray, _ = ray_at(rays, load(prepared.integers, NUMBER + r))
+    instance, words = _instance(tree, number)
+    object_ = _object(words)
+    put_slabs(prepared, r, slabs_within(instance, words, ray, largest_of(ray)))
+    store(prepared.integers, _NODES_AT + r, _nodes(object_))
+    store(prepared.integers, _BLOCKS_AT + r, load(object_, BLOCKS))
+
+
+@inlined
+def _prefetch(tree, prepared, r, child):
+    """Prefetch the record of a ray's next step."""
+    if child >= 0:
+        nodes, node = float32_pointer(load(prepared.integers, _NODES_AT + r)), (child & _NUMBER) * NODE_WORDS
+        for line in range(NODE_WORDS // _LINE):
+            prefetch(nodes, node + line * _LINE)
+    else:
+        block = (~child >> LEAF_BITS) & _NUMBER
+        blocks = float32_pointer(load(prepared.integers, _BLOCKS_AT + r))
+        for line in range(3):
+            prefetch(blocks, block * BLOCK_WORDS + line * _LINE)
+
+
+@inlined
+def scene_pointers(descriptor):
+    """The pointers in a scene's descriptor, whose arrays the caller must keep alive."""
+    at = pointer(descriptor)
+    nodes, instances = np.int64(load(at, TOP_NODES)), np.int64(load(at, INSTANCES))
+    return ScenePointers(
+        float32_pointer(nodes), int32_pointer(nodes), nodes, float64_pointer(instances), int64_pointer(instances),
+        np.int64(load(at, INSTANCE_COUNT)), local_floats(), np.int64(0), True, 1.0,
+        Ways(
+            _corners, _coordinate, _face, _corners_of_face, _child, _boxes, _enter, _begin, _node_of, _resume,
+            _are_coherent,
+        ),
+    )  # fmt: skip
