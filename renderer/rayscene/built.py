@@ -124,14 +124,15 @@ def _top(
 
 
 class Located(NamedTuple):
-    """Where faces of a scene are: their objects, which instances of those, which faces of their meshes, and whether
-    the instances are mirrored.
+    """Where faces of a scene are, with places on them: objects, which instances of those, which faces of their meshes,
+    and barycentrics on these.
     """
 
     object: NDArray[np.int64]
     instance: NDArray[np.int64]
     face: NDArray[np.int64]
-    mirrored: NDArray[np.bool_]
+    u: NDArray[np.float64]
+    v: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +171,7 @@ class BuiltScene:
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """A box around all that is shown."""
         rows = self.top.nodes[:CHILDREN].reshape(3, 2, 8)
-        return np.float64(rows[:, 0].min(axis=1)), np.float64(rows[:, 1].max(axis=1))
+        return rows[:, 0].min(axis=1).astype(np.float64), rows[:, 1].max(axis=1).astype(np.float64)
 
     @property
     def vertices(self) -> NDArray[np.float64]:
@@ -218,22 +219,18 @@ class BuiltScene:
         """The transforms of a member's instances, (k, 3, 4)."""
         return matrices_of(member, self.top.instances)
 
-    def located(self, faces: NDArray[np.int64]) -> Located:
-        """Where faces of the scene (...) are; -1 for -1."""
-        flat = np.ascontiguousarray(faces).reshape(-1)
-        instance, local, mirrored = np.empty_like(flat), np.empty_like(flat), np.empty(len(flat), np.bool_)
+    def located(self, faces: NDArray[np.int64], u: NDArray[np.float64], v: NDArray[np.float64]) -> Located:
+        """Where faces of the scene (...) and places on them are; -1 for -1."""
+        flat, weights = np.ascontiguousarray(faces).reshape(-1), np.stack([u.reshape(-1), v.reshape(-1)])
+        located, swapped = np.empty((3, len(flat)), np.int64), np.empty((2, len(flat)))
         words = self.top.instances.view(np.int64)
+        members = np.array([(m.begin, m.id) for m in self.members] + [(len(words), -1)], np.int64)
 
         def find(begin: int, end: int) -> None:
-            locate(words, flat, instance, local, mirrored, begin, end)
+            locate(words, members, flat, weights, located, swapped, begin, end)
 
         for_chunks(find, len(flat), _CHUNK, self.threads)
-        begins = np.array([m.begin for m in self.members] + [0])
-        ids = np.array([m.id for m in self.members] + [-1])
-        member = np.where(instance >= 0, np.searchsorted(begins[:-1], instance, side="right") - 1, -1)
-        return Located(
-            *(values.reshape(faces.shape) for values in (ids[member], instance - begins[member], local, mirrored))
-        )
+        return Located(*(row.reshape(faces.shape) for row in (*located, *swapped)))
 
     def corners(self, faces: NDArray[np.int64]) -> NDArray[np.float64]:
         """The placed corners of faces of the scene, (k, 3, 3)."""

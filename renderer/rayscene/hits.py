@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from renderer.errors import expect
+from renderer.lazy import lazy
 from renderer.mesh.mesh import Mesh, face_normals
 from renderer.mesh.values import Owner, interpolated
-from renderer.rayscene.built import BuiltScene
+from renderer.rayscene.built import BuiltScene, Located
 from renderer.results.closest_points import ClosestPoints
 from renderer.results.hits import AllHits, Hits, Passage
 
@@ -20,16 +20,40 @@ Values = ArrayLike | Mapping[int, ArrayLike]
 
 
 class _Places:
-    """What hits on a scene have in common: places on faces of the scene, ``(...)`` or ``(m,)``."""
+    """Places on faces of a scene, ``(...)`` or ``(m,)``."""
 
-    __slots__ = ()
-    face: NDArray[np.int64]
-    u: NDArray[np.float64]
-    v: NDArray[np.float64]
-    object: NDArray[np.int64]
-    _scene: BuiltScene
-    _all: NDArray[np.int64]
-    _mirrored: NDArray[np.bool_]
+    def __init__(self, found: Hits | AllHits | ClosestPoints, scene: BuiltScene) -> None:
+        self._found, self._scene = found, scene
+
+    @lazy
+    def _at(self) -> Located:
+        # Computed when it is read: many queries read t alone.
+        return self._scene.located(self._found.face, self._found.u, self._found.v)
+
+    @property
+    def object(self) -> NDArray[np.int64]:
+        """The objects, as ``RayScene.add`` numbers them, (...) int64; -1 on a miss."""
+        return self._at.object
+
+    @property
+    def instance(self) -> NDArray[np.int64]:
+        """Which of the object's instances, (...) int64; -1 on a miss."""
+        return self._at.instance
+
+    @property
+    def face(self) -> NDArray[np.int64]:
+        """The faces of the objects' meshes, (...) int64; -1 on a miss."""
+        return self._at.face
+
+    @property
+    def u(self) -> NDArray[np.float64]:
+        """Barycentrics on the mesh: the point is (1 - u - v) p0 + u p1 + v p2, placed, (...) float64; nan on a miss."""
+        return self._at.u
+
+    @property
+    def v(self) -> NDArray[np.float64]:
+        """See ``u``."""
+        return self._at.v
 
     @property
     def points(self) -> NDArray[np.float64]:
@@ -59,25 +83,20 @@ class _Places:
         >>> scene.closest_hit([0.5, 0.25, 9], [0, 0, -1]).normals
         array([0., 0., 1.])
         """
-        return self._on_hits(lambda hit: face_normals(self._scene.corners(self._all[hit])), (3,))
+        return self._on_hits(lambda hit: face_normals(self._scene.corners(self._found.face[hit])), (3,))
 
     def _points(self, hit: NDArray[np.bool_]) -> NDArray[np.float64]:
-        corners = self._scene.corners(self._all[hit])
-        u, v = (weights[hit] for weights in self._placed_weights)
+        found = self._found
+        corners, u, v = self._scene.corners(found.face[hit]), found.u[hit], found.v[hit]
         points: NDArray[np.float64] = (1.0 - u - v)[:, None] * corners[:, 0]
         points += u[:, None] * corners[:, 1]
         points += v[:, None] * corners[:, 2]
         return points
 
-    @property
-    def _placed_weights(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """u and v on the placed faces, of which mirrored ones have their second and third corner swapped."""
-        return np.where(self._mirrored, self.v, self.u), np.where(self._mirrored, self.u, self.v)
-
     def _on_hits(self, values: Callable[[NDArray[np.bool_]], NDArray[np.float64]], row: tuple[int, ...]) -> Any:
         """An array of the values at hits, and nan elsewhere."""
-        hit = self.face >= 0
-        found = np.full((*self.face.shape, *row), np.nan)
+        hit = self._found.face >= 0
+        found = np.full((*hit.shape, *row), np.nan)
         found[hit] = values(hit)
         return found
 
@@ -196,7 +215,6 @@ def _by_object(values: Values, meshes: dict[int, Mesh]) -> dict[int, Any]:
     return {next(iter(meshes)): values}
 
 
-@dataclass(eq=False)
 class SceneHits(_Places):
     """Closest hits on a scene. Their shape (...) is that of the rays.
 
@@ -204,14 +222,6 @@ class SceneHits(_Places):
     ----------
     t : ndarray of float64, shape (...)
         Distance in units of ``|direction|``; inf on a miss.
-    object : ndarray of int64, shape (...)
-        The object, as ``RayScene.add`` numbers it; -1 on a miss.
-    instance : ndarray of int64, shape (...)
-        Which of the object's instances; -1 on a miss.
-    face : ndarray of int64, shape (...)
-        The face of the object's mesh; -1 on a miss.
-    u, v : ndarray of float64, shape (...)
-        Barycentrics on the face of the object's mesh: the point is (1 - u - v) p0 + u p1 + v p2, placed; nan on a miss.
     side : ndarray of int64, shape (...)
         The side of the face that the ray came from: 1 that of its normal, -1 the other; 0 on a miss.
     t_error : ndarray of float64, shape (...), or None
@@ -228,30 +238,11 @@ class SceneHits(_Places):
     (array([ 0,  0, -1]), array([ 0,  1, -1]), array([10, 10, -1]))
     """
 
-    t: NDArray[np.float64]
-    object: NDArray[np.int64]
-    instance: NDArray[np.int64]
-    face: NDArray[np.int64]
-    u: NDArray[np.float64]
-    v: NDArray[np.float64]
-    side: NDArray[np.int64]
-    t_error: NDArray[np.float64] | None
-    _scene: BuiltScene = field(repr=False)
-    # Faces and piles among all faces of the scene.
-    _all: NDArray[np.int64] = field(repr=False)
-    _pile: NDArray[np.int64] = field(repr=False)
-    _mirrored: NDArray[np.bool_] = field(repr=False)
+    _found: Hits
 
-    @classmethod
-    def of(cls, hits: Hits, scene: BuiltScene) -> SceneHits:
-        """The hits on the faces of a scene as hits on its objects."""
-        at = scene.located(hits.face)
-        u, v = np.where(at.mirrored, hits.v, hits.u), np.where(at.mirrored, hits.u, hits.v)
-        assert hits.side is not None and hits._pile is not None  # as ``closest_hits`` makes them
-        return cls(
-            hits.t, at.object, at.instance, at.face, u, v, hits.side, hits.t_error, scene, hits.face, hits._pile,
-            at.mirrored,
-        )  # fmt: skip
+    def __init__(self, hits: Hits, scene: BuiltScene) -> None:
+        super().__init__(hits, scene)
+        self.t, self.side, self.t_error = hits.t, hits.side, hits.t_error
 
     @property
     def hit(self) -> NDArray[np.bool_]:
@@ -266,14 +257,7 @@ class SceneHits(_Places):
         >>> scene.closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1]).hit
         array([ True, False])
         """
-        return self.face >= 0
-
-    @property
-    def on_faces(self) -> Hits:
-        """The same on faces of the scene, as ``leaving`` takes them."""
-        u, v = self._placed_weights
-        mesh: Any = self._scene
-        return Hits(self.t, self._all, u, v, mesh, self.t_error, self.side, self._pile)
+        return self._found.hit
 
     def through(self) -> Passage:
         """Return the same places for rays that go on through the faces: ``leaving=hits.through()``.
@@ -292,10 +276,9 @@ class SceneHits(_Places):
         >>> scene.closest_hit(hits.points, [[0, 0, -1]], leaving=hits.through()).t
         array([1.])
         """
-        return self.on_faces.through()
+        return self._found.through()
 
 
-@dataclass(eq=False)
 class SceneAllHits(_Places):
     """All hits of n rays on a scene, m in all; those of ray i are the rows offsets[i] to offsets[i + 1].
 
@@ -305,9 +288,7 @@ class SceneAllHits(_Places):
     ----------
     offsets : ndarray of int64, shape (n + 1,)
         Where the hits of each ray begin; from 0 to m.
-    t : ndarray of float64, shape (m,)
-        Distance in units of ``|direction|``.
-    object, instance, face, u, v, side, t_error
+    t, side, t_error
         As in ``SceneHits``, shape (m,).
 
     Examples
@@ -321,30 +302,11 @@ class SceneAllHits(_Places):
     (array([4., 5., 8., 9.]), array([1, 1, 0, 0]), array([4, 0]))
     """
 
-    offsets: NDArray[np.int64]
-    t: NDArray[np.float64]
-    object: NDArray[np.int64]
-    instance: NDArray[np.int64]
-    face: NDArray[np.int64]
-    u: NDArray[np.float64]
-    v: NDArray[np.float64]
-    side: NDArray[np.int64]
-    t_error: NDArray[np.float64] | None
-    _scene: BuiltScene = field(repr=False)
-    _all: NDArray[np.int64] = field(repr=False)
-    _mirrored: NDArray[np.bool_] = field(repr=False)
-    _shape: tuple[int, ...] = field(repr=False)
+    _found: AllHits
 
-    @classmethod
-    def of(cls, hits: AllHits, scene: BuiltScene) -> SceneAllHits:
-        """The hits on the faces of a scene as hits on its objects."""
-        at = scene.located(hits.face)
-        u, v = np.where(at.mirrored, hits.v, hits.u), np.where(at.mirrored, hits.u, hits.v)
-        assert hits.side is not None  # as ``all_hits`` makes them
-        return cls(
-            hits.offsets, hits.t, at.object, at.instance, at.face, u, v, hits.side, hits.t_error, scene, hits.face,
-            at.mirrored, hits._shape,
-        )  # fmt: skip
+    def __init__(self, hits: AllHits, scene: BuiltScene) -> None:
+        super().__init__(hits, scene)
+        self.offsets, self.t, self.side, self.t_error = hits.offsets, hits.t, hits.side, hits.t_error
 
     @property
     def counts(self) -> NDArray[np.int64]:
@@ -359,7 +321,7 @@ class SceneAllHits(_Places):
         >>> scene.all_hits([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1]).counts
         array([2, 0])
         """
-        return np.diff(self.offsets).reshape(self._shape)
+        return self._found.counts
 
     @property
     def ray(self) -> NDArray[np.int64]:
@@ -374,10 +336,9 @@ class SceneAllHits(_Places):
         >>> scene.all_hits([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1]).ray
         array([0, 0])
         """
-        return np.repeat(np.arange(len(self.offsets) - 1), np.diff(self.offsets))
+        return self._found.ray
 
 
-@dataclass(eq=False)
 class SceneClosestPoints(_Places):
     """The nearest point of a scene to each of some points. The shape (...) is that of the points.
 
@@ -385,8 +346,6 @@ class SceneClosestPoints(_Places):
     ----------
     distance : ndarray of float64, shape (...)
         inf if nothing is within ``max_distance``.
-    object, instance, face, u, v
-        As in ``SceneHits``, shape (...).
 
     Examples
     --------
@@ -399,19 +358,6 @@ class SceneClosestPoints(_Places):
     (array([ 2., inf]), array([ 0, -1]))
     """
 
-    distance: NDArray[np.float64]
-    object: NDArray[np.int64]
-    instance: NDArray[np.int64]
-    face: NDArray[np.int64]
-    u: NDArray[np.float64]
-    v: NDArray[np.float64]
-    _scene: BuiltScene = field(repr=False)
-    _all: NDArray[np.int64] = field(repr=False)
-    _mirrored: NDArray[np.bool_] = field(repr=False)
-
-    @classmethod
-    def of(cls, near: ClosestPoints, scene: BuiltScene) -> SceneClosestPoints:
-        """The nearest points on faces of a scene as those on its objects."""
-        at = scene.located(near.face)
-        u, v = np.where(at.mirrored, near.v, near.u), np.where(at.mirrored, near.u, near.v)
-        return cls(near.distance, at.object, at.instance, at.face, u, v, scene, near.face, at.mirrored)
+    def __init__(self, near: ClosestPoints, scene: BuiltScene) -> None:
+        super().__init__(near, scene)
+        self.distance = near.distance

@@ -156,19 +156,40 @@ def box_all(instances, words, numbers, boxes, box_numbers):
 
 
 @kernel
-def locate(words, faces, instance, local, mirrored, begin, end):
-    """Write the instance, counted from 0, the face of its own mesh, and whether its matrix mirrors, of the faces
-    begin:end of a scene; -1, -1 and False for -1.
+def locate(words, members, faces, weights, located, swapped, begin, end):
+    """Write object, instance and face of the faces begin:end of a scene to ``located`` (3, k) int64, -1 for -1.
 
-    ``words`` (n, INSTANCE_WORDS) int64; the others (k,) int64 and bool.
+    words     (n, INSTANCE_WORDS) int64, the instances
+    members   (m, 2) int64, the first instance of each object and its number, and the number of instances last
+    weights   (2, k) float64, u and v on the placed face; ``swapped`` gets them on the face of the object's mesh, of
+              which a matrix that mirrors has swapped the second and third corner
     """
     for i in range(begin, end):
-        instance[i], local[i], mirrored[i] = -1, -1, False
+        u, v = weights[0, i], weights[1, i]
+        located[0, i], located[1, i], located[2, i] = -1, -1, -1
         if faces[i] >= 0:
-            number = instance_with(pointer(words), len(words), faces[i])
-            instance[i] = number - 1
-            local[i] = faces[i] - words[number - 1, FIRST_FACE]
-            mirrored[i] = words[number - 1, FLAGS] & MIRRORS != 0
+            k = instance_with(pointer(words), len(words), faces[i]) - 1
+            m = _member_with(members, k)
+            located[0, i], located[1, i], located[2, i] = (
+                members[m, 1],
+                k - members[m, 0],
+                faces[i] - words[k, FIRST_FACE],
+            )
+            if words[k, FLAGS] & MIRRORS != 0:
+                u, v = v, u
+        swapped[0, i], swapped[1, i] = u, v
+
+
+@kernel
+def _member_with(members, instance):
+    low, high = 0, len(members) - 2
+    while low < high:
+        middle = (low + high + 1) // 2
+        if members[middle, 0] <= instance:
+            low = middle
+        else:
+            high = middle - 1
+    return low
 
 
 @kernel

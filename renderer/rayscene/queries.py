@@ -91,7 +91,7 @@ class SceneQueries:
         hits = closest_hits(built.tree, rays, built.mesh, self.threads)
         if flag_argument("t_error", t_error):
             _add_errors(built, hits, rays, None, self.threads)
-        return SceneHits.of(hits.shaped(shape), built)
+        return SceneHits(hits.shaped(shape), built)
 
     def any_hit(
         self,
@@ -169,7 +169,7 @@ class SceneQueries:
         hits = all_hits(built.tree, rays, built.mesh, contacts, max_hits, shape, self.threads)
         if flag_argument("t_error", t_error):
             _add_errors(built, hits, rays, hits.ray, self.threads)
-        return SceneAllHits.of(hits, built)
+        return SceneAllHits(hits, built)
 
     def count_hits(
         self,
@@ -327,7 +327,7 @@ class SceneQueries:
         (array(1.), array(1))
         """
         built = self._built
-        return SceneClosestPoints.of(closest_point(built.tree, built.mesh, points, max_distance, self.threads), built)
+        return SceneClosestPoints(closest_point(built.tree, built.mesh, points, max_distance, self.threads), built)
 
     def signed_distance(
         self,

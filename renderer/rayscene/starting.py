@@ -60,7 +60,7 @@ def _rows(rays: RayBatch) -> NDArray[np.float64]:
 def _on_faces(scene: BuiltScene, leaving: Leaving) -> Hits | Passage | None:
     if isinstance(leaving, SceneHits):
         expect(leaving._scene is scene, "leaving", "hits on the scene as it is", "hits from before it changed")
-        return leaving.on_faces
+        return leaving._found
     expect(leaving is None or isinstance(leaving, Passage), "leaving", "hits of a scene", type(leaving).__name__)
     return leaving
 
