@@ -427,11 +427,15 @@ def meet_planes(tree, base, edges, seen, ray, t_min, t_max):
     near, zero = height <= limit + reach, splat4(0.0)
     # Of those seen, an edge function is 0 where the least or the most is.
     some = seen & movemask(determinant_uncertain | near | (edges.least == zero) | (edges.most == zero))
+    # Others whose planes are as near to the origin as it is moved: from its start the ray may pass within them.
+    beside = movemask(height < reach) & ~seen
     # What only these need is computed here: they are rare, and one branch costs less than that would in each block.
-    if unlikely(some != 0):
+    if unlikely(some | beside != 0):
         left = _left(tree, base, edges, ray) if ray.slack != 0.0 else np.int64(0)
+        # rule: beside-start
+        beside = beside & ~left & unsure_sides(edges, ray.slack) if beside & ~left != 0 else np.int64(0)
         # Most often the face that the ray leaves is the only one.
-        if some & ~left != 0:
+        if some & ~left | beside != 0:
             uncertain = determinant_uncertain | near | _may_be_on_edge(edges)
             # Whether the numerator, with its error, may make a t from t_min to t_max. A t that rounding made negative
             # may be 0. ERROR has the determinant's error too, because the numerator is t times the determinant.
@@ -443,7 +447,7 @@ def meet_planes(tree, base, edges, seen, ray, t_min, t_max):
                 t,
                 (seen & movemask(uncertain)) | (some & left),
                 seen & movemask(determinant_uncertain),
-                seen & movemask(due) & ~left,
+                (seen & movemask(due) & ~left) | beside,
             )
     return PlaneHits(t, some, np.int64(0), np.int64(0))
 
@@ -525,7 +529,7 @@ class BlockHits(NamedTuple):
 def hit_triangles(tree, base, ray, t_min, t_max):
     """The ``BlockHits`` of the block at ``base`` by a watertight test; ``resolve`` decides the uncertain ones."""
     edges, bits = see_triangles(tree, base, ray)
-    if bits == 0:
+    if bits == 0 and ray.slack == 0.0:
         zero = splat4(0.0)
         return BlockHits(bits, bits, bits, bits, zero, zero, zero, zero)
     planes = meet_planes(tree, base, edges, bits, ray, t_min, t_max)

@@ -68,12 +68,20 @@ def put_node(holders, k, word, value):
 
 @kernel
 def add_holder(holders, count, place, face, zeros):
-    """Add a face to the holders, if there is room. Returns their number."""
+    """Insert a face into the holders by its number, if there is room. Returns how many there are.
+
+    In the order of the numbers, no answer depends on the order in which a tree lists them.
+    """
     if count >= MOST_HOLDERS:
         return count
-    put_holder(holders, count, PLACE, place)
-    put_holder(holders, count, NUMBER, face)
-    put_holder(holders, count, ZEROS, zeros)
+    k = count
+    while k > 0 and holder(holders, k - 1, NUMBER) > face:
+        for word in (PLACE, NUMBER, ZEROS):
+            put_holder(holders, k, word, holder(holders, k - 1, word))
+        k -= 1
+    put_holder(holders, k, PLACE, place)
+    put_holder(holders, k, NUMBER, face)
+    put_holder(holders, k, ZEROS, zeros)
     put_holder(holders, count, _IS_ARC, 0)
     return count + 1
 

@@ -17,7 +17,7 @@ from renderer.trace.intersect import face_in
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import octants_around
 from renderer.trace.starts.anchor import anchor_of
-from renderer.trace.starts.cone import MOST_HOLDERS, NUMBER, PLACE, ZEROS, holder, put_holder
+from renderer.trace.starts.cone import NUMBER, PLACE, ZEROS, add_holder, holder, put_holder
 from renderer.trace.starts.meeting import has_area, height_sign, seen_from, turn_sign, unit_direction
 from renderer.trace.starts.record import BARYCENTRIC, Start, corners_of
 from renderer.trace.walk import walk
@@ -216,7 +216,7 @@ def _list_in(tree, query, first, blocks, count):
             place = slot // BLOCK_FACES * BLOCK_WORDS + slot % BLOCK_FACES
             held = _hold_sign(corners_at(tree, place), query.o, query.room)
             if held >= 0:
-                count = _put_face(query.holders, count, place, np.int64(face), held)
+                count = add_holder(query.holders, count, place, np.int64(face), held)
     return count, False
 
 
@@ -246,20 +246,3 @@ def _keep_members(tree, met, holders, count):
             put_holder(holders, kept, NUMBER, face)
             kept += 1
     return kept
-
-
-@inlined
-def _put_face(holders, count, place, face, held):
-    """Insert a face into the list by its number, if there is room. Returns the number listed."""
-    if count >= MOST_HOLDERS:
-        return count
-    k = count
-    while k > 0 and holder(holders, k - 1, NUMBER) > face:
-        put_holder(holders, k, PLACE, holder(holders, k - 1, PLACE))
-        put_holder(holders, k, NUMBER, holder(holders, k - 1, NUMBER))
-        put_holder(holders, k, ZEROS, holder(holders, k - 1, ZEROS))
-        k -= 1
-    put_holder(holders, k, PLACE, place)
-    put_holder(holders, k, NUMBER, face)
-    put_holder(holders, k, ZEROS, held)
-    return count + 1
