@@ -28,13 +28,13 @@ from renderer.trace.instances import (
     MESH_FACES,
     MIDDLE,
     NUMBER_BITS,
+    OBJECT,
     OBJECT_WORDS,
     SCENE_WORDS,
     TOP_NODES,
     VERTICES,
 )
 from renderer.trace.layout import BLOCK_WORDS, CHILDREN, LEAF_BITS, NODE_WORDS, TREE_WORDS, UNUSED, cache_aligned
-from renderer.tree.bounds import BOX
 from renderer.tree.build import SPLITS, build_nodes, new_faces
 from renderer.tree.hierarchy import Rule
 
@@ -42,8 +42,6 @@ from renderer.tree.hierarchy import Rule
 MOST_FACES = np.iinfo(np.int32).max - 1
 # A block and the place in it share a number with the instance.
 _MOST_BLOCKS = (1 << NUMBER_BITS) // BLOCK_WORDS
-# The largest coordinate of a scene, as of the boxes of a mesh (``octree``).
-_LARGEST = np.float32(2.0**60)
 # Faces that are looked for together: a tenth of a millisecond.
 _CHUNK = 4096
 _RULE = Rule(SPLITS["midpoint"], 1, 32)
@@ -83,7 +81,9 @@ class SceneTree:
         words = instances.view(np.int64)
         shown = np.flatnonzero(words[:, FLAGS] & HIDDEN == 0)
         faces = {member.id: len(member.built.mesh.faces) for member in members}
-        filled = np.repeat([faces[m.id] > 0 for m in members], [m.count for m in members])
+        filled = np.repeat(
+            np.array([faces[m.id] > 0 for m in members], np.bool_), np.array([m.count for m in members], np.int64)
+        )
         shown = shown[filled[shown]]
         self.members, self.instances = members, instances
         self.nodes, levels = _top(instances, words, shown, threads)
@@ -111,10 +111,6 @@ def _top(
         return nodes, 1
     order = new_faces(len(shown))
     box_all(instances, words, shown, order.boxes, order.numbers)
-    boxes = order.boxes.reshape(-1, BOX)
-    if not (np.abs(boxes[:, [0, 1, 2, 4, 5, 6]]) <= _LARGEST).all():
-        row = int((~(np.abs(boxes[:, :7]) <= _LARGEST).all(axis=1)).argmax())
-        expect(False, "transforms", f"coordinates up to {_LARGEST:.3g}", f"larger ones of instance {shown[row]}")
     nodes, block_faces, depth = build_nodes(order, _RULE, threads)
     links = nodes.view(np.int32).reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8]
     used = nodes.reshape(-1, NODE_WORDS)[:, :8] <= nodes.reshape(-1, NODE_WORDS)[:, 8:16]
@@ -261,10 +257,11 @@ def new_records(count: int) -> NDArray[np.float64]:
 
 
 def number_faces(members: list[Member], instances: NDArray[np.float64]) -> None:
-    """Write the number of the first face of each instance, and the address of its object."""
+    """Write the number of the first face of each instance, and the address of its object, which changes with it."""
     words, first = instances.view(np.int64), 0
     for m in members:
         own = words[m.begin : m.begin + m.count]
         faces = len(m.built.mesh.faces)
+        own[:, OBJECT] = m.row.ctypes.data
         own[:, FIRST_FACE] = first + faces * np.arange(m.count)
         first += faces * m.count

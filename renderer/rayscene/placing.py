@@ -43,6 +43,8 @@ from renderer.tree.bounds import BOX, FACE
 # The most that the product of a matrix and its inverse may differ from 1. Beyond that a ray turned into the mesh's
 # frame would miss its boxes by more than the width of a face.
 SINGULAR = 2.0**-20
+# The largest coordinate of a scene, as that of a mesh's boxes (``octree``).
+LARGEST = 2.0**60
 # Roundings of a placed corner, of the placed middle and of the inverse, eight each and room.
 _ROUNDED = 2.0**-48
 
@@ -52,7 +54,7 @@ def place(matrices, instances, words, begin, end):
     """Write matrix, inverse, place, room and the flag of mirrors of the instances begin:end, whose objects are written.
 
     ``matrices`` (k, 3, 4) float64; ``instances`` (k, INSTANCE_WORDS) float64 and ``words`` are the same memory. Returns
-    the first one whose matrix is singular or nearly so, or -1.
+    the first one whose matrix is singular or nearly so, or whose coordinates are too large, or -1.
     """
     for i in range(begin, end):
         record, flags = offset(pointer(instances), i * INSTANCE_WORDS), offset(pointer(words), i * INSTANCE_WORDS)
@@ -107,7 +109,8 @@ def _put_room(record, own):
 
     A point p of the mesh, placed at x, comes back at p + E (p - middle) + inverse times the rounding of x, where E is
     the inverse times the matrix, less 1. Beside that, a hit may be DISTANCE_ROOM of its distance beside its face: that
-    of the middle counts with the ray, that of the face from the middle here.
+    of the middle counts with the ray, that of the face from the middle here. Returns whether E and all coordinates are
+    small enough.
     """
     far, matrix, inverse = 0.0, offset(record, MATRIX), offset(record, INVERSE)
     for k in range(3):
@@ -117,6 +120,9 @@ def _put_room(record, own):
             reach += abs(load(matrix, 4 * k + j)) * load(own, HALF + j)
         store(record, PLACE + k, place)
         far = maximum(far, reach)
+        # False for NaN too.
+        if not abs(place) + reach <= LARGEST:
+            return False
     worst = 0.0
     for k in range(3):
         room = 0.0

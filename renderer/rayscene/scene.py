@@ -25,7 +25,7 @@ from renderer.rayscene.built import (
     new_records,
     number_faces,
 )
-from renderer.rayscene.placing import place
+from renderer.rayscene.placing import LARGEST, place
 from renderer.rayscene.queries import SceneQueries
 from renderer.system.threads import checked_threads
 from renderer.trace.instances import FLAGS, HIDDEN, MASK_BITS, OBJECT
@@ -339,7 +339,8 @@ def _place(member: Member, records: NDArray[np.float64], matrices: NDArray[np.fl
     words = records.view(np.int64)
     words[:, OBJECT] = member.row.ctypes.data
     bad = place(matrices, records, words, 0, len(records))
-    expect(bad < 0, "transforms", "matrices that can be inverted", f"{matrices[bad].tolist()} for instance {bad}")
+    expected = f"matrices that can be inverted, with coordinates up to {LARGEST:.3g}"
+    expect(bad < 0, "transforms", expected, f"{matrices[bad].tolist()} for instance {bad}")
 
 
 def _matrices(transforms: ArrayLike | None) -> NDArray[np.float64]:

@@ -1,0 +1,337 @@
+"""Scenes answer like the one mesh that their placed meshes make together, and know what was hit."""
+
+import threading
+
+import numpy as np
+import pytest
+from cases import cases
+from hypothesis import given
+from hypothesis import strategies as st
+from meshes import KINDS, assert_same_hits, make_mesh, rays_at
+
+from renderer import Mesh, MeshError, Octree, RayScene
+from renderer.mesh.shapes import box, icosphere
+
+pytestmark = pytest.mark.judges(
+    "RayScene", "RayScene.add", "RayScene.all_hits", "RayScene.any_hit", "RayScene.closest_hit",
+    "RayScene.closest_point", "RayScene.contains", "RayScene.count_hits", "RayScene.count_steps", "RayScene.mesh",
+    "RayScene.merged", "RayScene.move", "RayScene.name", "RayScene.objects", "RayScene.refit", "RayScene.remove",
+    "RayScene.show", "RayScene.signed_distance", "RayScene.transforms", "RayScene.visible", "RayScene.winding_number",
+)  # fmt: skip
+
+
+def rotation(rng):
+    return np.linalg.qr(rng.normal(size=(3, 3)))[0]
+
+
+def step(rng):
+    return rng.integers(-3, 4, 3)
+
+
+# Linear part and translation. Integer steps make instances share edges, corners and planes.
+PLACINGS = {
+    "steps": lambda rng: (np.eye(3), step(rng)),
+    "axes": lambda rng: (np.eye(3)[rng.permutation(3)] * rng.choice([-1, 1], 3), step(rng)),
+    "turned": lambda rng: (rotation(rng), rng.normal(size=3)),
+    "mirrored": lambda rng: (np.diag([-1.0, 1.0, 1.0]), step(rng)),
+    "sheared": lambda rng: (np.eye(3) + np.triu(rng.normal(size=(3, 3)), 1) * 3, rng.normal(size=3)),
+    "tiny": lambda rng: (rotation(rng) * 1e-6, rng.normal(size=3) * 1e-6),
+    "huge": lambda rng: (rotation(rng) * 1e6, rng.normal(size=3) * 1e6),
+    "squashed": lambda rng: (rotation(rng) @ np.diag([1.0, 1.0, 1e-5]) @ rotation(rng), rng.normal(size=3)),
+    "on a map": lambda rng: (rotation(rng), np.array([5e5, 5.4e6, 100.0]) + step(rng)),
+}
+
+
+def placed(rng, kind, count):
+    """Transforms (count, 3, 4) of one kind, or of all."""
+    matrices = np.empty((count, 3, 4))
+    for k in range(count):
+        linear, translation = PLACINGS[kind if kind in PLACINGS else rng.choice(sorted(PLACINGS))](rng)
+        matrices[k, :, :3], matrices[k, :, 3] = linear, translation
+    return matrices
+
+
+def make_scene(seed, threads=1):
+    rng, scene = np.random.default_rng(seed), RayScene(threads=threads)
+    for _ in range(rng.integers(1, 4)):
+        vertices, faces = make_mesh(rng.choice(sorted(KINDS)), int(rng.integers(1 << 20)), int(rng.integers(1, 60)))
+        scene.add(Mesh(vertices, faces), placed(rng, rng.choice([*PLACINGS, "all"]), int(rng.integers(1, 8))))
+    return scene
+
+
+def assert_like_merged(scene, seed):
+    """Every query has the bits of the merged mesh."""
+    merged = Octree(scene.merged, threads=1)
+    origins, directions = rays_at(merged.mesh.vertices, merged.mesh.faces, seed)
+    hits, expected = scene.closest_hit(origins, directions), merged.closest_hit(origins, directions)
+    assert_same_hits(hits._found, expected)
+    np.testing.assert_array_equal(hits.side, expected.side)
+    np.testing.assert_array_equal(hits.points, expected.points)
+    np.testing.assert_array_equal(hits.normals, expected.normals)
+    few, alike = (one.closest_hit(origins[:9], directions[:9]) for one in (scene, merged))
+    assert_same_hits(few._found, alike)
+    np.testing.assert_array_equal(scene.any_hit(origins, directions), expected.hit)
+
+    several, others = (one.all_hits(origins, directions, t_error=True) for one in (scene, merged))
+    for name in ("t", "t_error", "side", "offsets"):
+        np.testing.assert_array_equal(getattr(several, name), getattr(others, name))
+    np.testing.assert_array_equal(several._found.face, others.face)
+    np.testing.assert_array_equal(scene.count_hits(origins, directions), others.counts)
+
+    hit = expected.hit
+    start, same = (one.closest_hit(origins[hit], directions[hit]) for one in (scene, merged))
+    away = np.random.default_rng(seed).normal(size=start.points.shape)
+    for leaving, also in ((start, same), (start.through(), same.through())):
+        assert_same_hits(
+            scene.closest_hit(start.points, away, leaving=leaving)._found,
+            merged.closest_hit(same.points, away, leaving=also),
+        )
+
+    points = np.concatenate([origins[:50], merged.mesh.triangles[:20].mean(axis=1), merged.mesh.vertices[:20]])
+    near, nearest = scene.closest_point(points), merged.closest_point(points)
+    np.testing.assert_array_equal(near.distance, nearest.distance)
+    np.testing.assert_array_equal(near._found.face, nearest.face)
+    np.testing.assert_array_equal(near.points, nearest.points)
+
+
+@given(st.integers(0, 2**20))
+def test_a_scene_has_the_bits_of_its_merged_mesh(seed):
+    assert_like_merged(make_scene(seed), seed)
+
+
+@given(st.integers(0, 2**20))
+def test_it_has_them_after_every_change(seed):
+    rng, scene = np.random.default_rng(seed), make_scene(seed)
+    first = scene.objects[0]
+    scene.closest_point([0.0, 0.0, 0.0])  # what was queried before is forgotten
+    count = len(scene.transforms(first))
+    scene.move(first, placed(rng, "all", count))
+    assert_like_merged(scene, seed)
+    scene.refit(first, scene.mesh(first).vertices * [1.0, -2.0, 0.5])
+    assert_like_merged(scene, seed)
+    scene.move(first, placed(rng, "turned", 1), instances=[count - 1])
+    added = scene.add(icosphere(1), placed(rng, "all", 3))
+    assert_like_merged(scene, seed)
+    scene.remove(first)
+    assert_like_merged(scene, seed)
+    assert scene.objects[-1] == added and first not in scene.objects
+
+
+def test_a_thousand_instances_in_a_lattice_and_any_threads():
+    rng = np.random.default_rng(1)
+    corners = np.stack(np.meshgrid(*[np.arange(10.0)] * 3), axis=-1).reshape(-1, 3)
+    matrices = np.concatenate([np.broadcast_to(np.eye(3), (1000, 3, 3)), corners[:, :, None]], axis=2)
+    scenes = [RayScene(threads=threads) for threads in (1, 2, 7)]
+    for scene in scenes:
+        scene.add(box(), matrices)
+    origins = rng.uniform(-5, 15, (20_000, 3))
+    directions = rng.integers(0, 11, origins.shape) - origins
+    expected = Octree(scenes[0].merged).closest_hit(origins, directions)
+    for scene in scenes:
+        assert_same_hits(scene.closest_hit(origins, directions)._found, expected)
+    # Walls of neighbours coincide: the lowest instance has the hit.
+    inside = scenes[0].closest_hit([0.25, 0.5, 0.5], [1.0, 0.0, 0.0])
+    assert inside.t == 0.75 and (scenes[0].transforms(0)[inside.instance, :, 3] == [0, 0, 0]).all()
+
+
+def test_no_ray_passes_between_two_placed_parts_that_share_an_edge():
+    """Each half of a square is an instance of a triangle, turned so that corners, once placed, are no round numbers."""
+    rng, triangle = np.random.default_rng(2), Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    linear = rotation(rng) * 1.7
+    # The second is the first turned half round about the middle of the long side, so that the ends change places.
+    scene, other = RayScene(), Mesh([[1, 1, 0], [0, 1, 0], [1, 0, 0]], [[0, 1, 2]])
+    place = np.column_stack([linear, rng.normal(size=3)])
+    scene.add(triangle, place)
+    scene.add(other, place)
+    share = rng.random((100_000, 1))
+    ends = scene.merged.vertices[[1, 2]]
+    targets = ends[0] * share + ends[1] * (1 - share)
+    origins = targets + rng.normal(size=targets.shape) * 3
+    assert scene.any_hit(origins, targets - origins).all()
+
+
+def test_what_was_hit_is_known():
+    scene = RayScene()
+    ground = scene.add(box((-9, -9, -1), (9, 9, 0)), name="ground")
+    cubes = scene.add(box(), [[[-2, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 0]] for x in (3, 7)])
+    hits = scene.closest_hit([[2.5, 0.25, 9], [6, 0.5, 9], [-5, 0, 9], [50, 0, 9]], [0, 0, -1])
+    assert hits.object.tolist() == [cubes, cubes, ground, -1] and hits.instance.tolist() == [0, 1, 0, -1]
+    assert hits.t.tolist() == [8, 8, 9, np.inf] and hits.hit.tolist() == [True, True, True, False]
+    # On the mesh as it was added, also where the matrix mirrors: x = 3 - 2 x of the mesh.
+    np.testing.assert_allclose(hits.interpolate({cubes: box().vertices})[:2], [[0.25, 0.25, 1], [0.5, 0.5, 1]])
+    own = scene.mesh(cubes).vertices[scene.mesh(cubes).faces[hits.face[0]]]
+    u, v = hits.u[0], hits.v[0]
+    np.testing.assert_allclose((1 - u - v) * own[0] + u * own[1] + v * own[2], [0.25, 0.25, 1])
+    assert scene.name(ground) == "ground" and scene.objects == [ground, cubes]
+
+
+def test_colours_and_texture_coordinates_are_those_of_the_object_and_nan_elsewhere():
+    corners, faces = [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]
+    plain, scene = Mesh(corners, faces), RayScene()
+    scene.add(Mesh(corners, faces, colors=np.eye(3), texcoords=[[0, 0], [1, 0], [0, 1]]))
+    scene.add(plain, [[1, 0, 0, 5], [0, 1, 0, 0], [0, 0, 1, 0]])
+    hits = scene.closest_hit([[0.25, 0.5, 1], [5.25, 0.5, 1], [9, 9, 9]], [0, 0, -1])
+    np.testing.assert_array_equal(hits.colors, [[0.25, 0.25, 0.5], [np.nan] * 3, [np.nan] * 3])
+    np.testing.assert_array_equal(hits.texcoords, [[0.25, 0.5], [np.nan] * 2, [np.nan] * 2])
+    np.testing.assert_array_equal(hits.take({0: [[7.0, 8.0]]}), [[7, 8], [np.nan] * 2, [np.nan] * 2])
+
+
+def test_masks_choose_what_each_ray_may_hit():
+    scene = RayScene()
+    scene.add(box(), [[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 2 * k]] for k in range(32)], mask=1 << np.arange(32))
+    masks = np.array([1, 2, 1 << 31, 0b1010, (1 << 32) - 1, 0, 6])
+    expected = [0, 1, 31, 3, 31, -1, 2]
+    down, aim = [[0.3, 0.4, 99.0]], [0.0, 0.0, -1.0]
+    assert scene.closest_hit(down, aim, mask=masks).instance.tolist() == expected
+    # The same in a stream of many.
+    many = scene.closest_hit(down, aim, mask=np.repeat(masks, 10))
+    assert many.instance.tolist() == np.repeat(expected, 10).tolist()
+    assert scene.any_hit(down, aim, mask=masks).tolist() == [found >= 0 for found in expected]
+    assert scene.all_hits(down, aim, mask=0b1010).instance.tolist() == [3, 3, 1, 1]
+    assert scene.closest_hit(down, aim, mask=4).instance.tolist() == [2]
+
+
+@cases("repeats", [1, 10])
+def test_a_ray_passes_through_the_instance_that_it_ignores(repeats):
+    scene = RayScene()
+    scene.add(box(), [[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 2 * k]] for k in range(3)])
+    origins = np.repeat([[0.3, 0.4, 9.0], [0.3, 0.4, -9.0], [5.0, 5.0, 9.0]], repeats, axis=0)
+    aims = np.repeat([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]], repeats, axis=0)
+    first = scene.closest_hit(origins, aims)
+    second = scene.closest_hit(origins, aims, ignore=first)
+    assert first.instance.tolist() == np.repeat([2, 0, -1], repeats).tolist()
+    assert second.instance.tolist() == np.repeat([1, 1, -1], repeats).tolist()
+    # From the body itself: a ray into it comes out on the other side unhindered.
+    inward = scene.closest_hit(first.points[first.hit], aims[first.hit], leaving=first_of(scene, origins, aims, first))
+    assert (inward.t == 0).all() or inward.hit.all()
+    free = scene.closest_hit(origins[first.hit], aims[first.hit], ignore=first_of(scene, origins, aims, first))
+    assert (free.instance == 1).all()
+
+
+def first_of(scene, origins, aims, hits):
+    return scene.closest_hit(origins[hits.hit], aims[hits.hit])
+
+
+def test_hidden_instances_are_hit_by_nothing_and_keep_their_numbers():
+    scene = RayScene()
+    cubes = scene.add(box(), [[[1, 0, 0, 2 * k], [0, 1, 0, 0], [0, 0, 1, 0]] for k in range(3)])
+    origins = [[2 * k + 0.3, 0.4, 9.0] for k in range(3)]
+    scene.show(cubes, np.array([True, False, True]))
+    assert scene.closest_hit(origins, [0, 0, -1]).instance.tolist() == [0, -1, 2]
+    assert scene.contains([[0.5, 0.5, 0.5], [2.5, 0.5, 0.5]]).tolist() == [True, False]
+    assert len(scene.merged.faces) == 24
+    scene.show(cubes, False)
+    assert not scene.any_hit(origins, [0, 0, -1]).any()
+    scene.show(cubes)
+    assert scene.closest_hit(origins, [0, 0, -1]).instance.tolist() == [0, 1, 2]
+
+
+def test_an_empty_scene_is_hit_by_nothing():
+    scene = RayScene()
+    assert not scene.any_hit([0, 0, 0], [1, 0, 0]) and scene.closest_hit([0, 0, 0], [1, 0, 0]).object == -1
+    scene.add(Mesh(np.empty((0, 3)), np.empty((0, 3), int)))
+    scene.add(box())
+    hits = scene.closest_hit([0.5, 0.25, 9], [0, 0, -1])
+    assert hits.object == 1 and hits.t == 8
+    with pytest.raises(ValueError, match="mesh: expected faces"):
+        RayScene().contains([0, 0, 0])
+
+
+def test_an_octree_is_shared_and_a_refit_of_one_object_changes_no_other():
+    octree, scene = Octree(box()), RayScene()
+    one, other = scene.add(octree), scene.add(octree, [[1, 0, 0, 5], [0, 1, 0, 0], [0, 0, 1, 0]])
+    assert scene.mesh(one) is octree.mesh is scene.mesh(other)
+    scene.refit(one, box().vertices * 2)
+    hits = scene.closest_hit([[0.5, 0.25, 9], [5.5, 0.25, 9]], [0, 0, -1])
+    assert hits.t.tolist() == [7, 8] and octree.mesh.extent.tolist() == [1, 1, 1]
+
+
+def test_queries_see_the_scene_before_or_after_a_move():
+    scene = RayScene()
+    cubes = scene.add(box(), [[[1, 0, 0, 2 * k], [0, 1, 0, 0], [0, 0, 1, 0]] for k in range(50)])
+    low = scene.transforms(cubes)
+    high = low + np.array([[0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 4]])
+    origins = np.array([[2 * k + 0.3, 0.4, 9.0] for k in range(50)])
+    seen, ends = [], threading.Event()
+
+    def query():
+        while not ends.is_set():
+            seen.append(set(scene.closest_hit(origins, [0, 0, -1]).t.tolist()))
+
+    threads = [threading.Thread(target=query) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for k in range(200):
+        scene.move(cubes, high if k % 2 else low)
+    ends.set()
+    for thread in threads:
+        thread.join()
+    assert seen and all(found in ({8.0}, {4.0}) for found in seen)
+
+
+def test_inside_and_distance_of_closed_parts_that_overlap():
+    scene = RayScene()
+    scene.add(box(), [[[2, 0, 0, 0], [0, 2, 0, 0], [0, 0, -2, 2]], [[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1]]])
+    points = [[1.5, 1.5, 1.5], [0.5, 0.5, 0.5], [2.0, 2.0, 2.0], [3.0, 1.0, 1.0]]
+    assert scene.contains(points).tolist() == [True, True, True, False]
+    np.testing.assert_allclose(scene.winding_number(points[:2], 1e-9), [2, 1], atol=1e-8)
+    assert scene.signed_distance(points).tolist() == [-0.5, -0.5, 0.0, 1.0]
+    assert scene.visible([5, 1, 1], [[2, 1, 1], [-1, 1, 1]]).tolist() == [True, False]
+    assert (scene.count_steps([[1, 1, 9]], [0, 0, -1]).nodes > 0).all()
+
+
+def crushed():
+    turned = rotation(np.random.default_rng(3))
+    return np.column_stack([turned @ np.diag([1.0, 1.0, 1e-14]) @ turned.T, np.zeros(3)])
+
+
+def before_a_move(scene):
+    hits = scene.closest_hit([0.5, 0.5, 9], [0, 0, -1])
+    scene.move(0, np.eye(4))
+    return hits
+
+
+HERE, DOWN = [0.5, 0.25, 9], [0, 0, -1]
+FAULTS = {
+    "transforms: expected matrices that can be inverted.* for instance 1": lambda s: s.add(
+        box(), [np.eye(4), np.diag([1.0, 1.0, 0.0, 1.0])]
+    ),
+    "transforms: expected matrices that can be inverted": lambda s: s.add(box(), crushed()),
+    "transforms: expected finite matrices.* in row 0": lambda s: s.add(box(), np.full((3, 4), np.nan)),
+    r"transforms: expected shape \(3, 4\)": lambda s: s.add(box(), np.eye(3)),
+    "transforms: expected 1 matrices, got 2": lambda s: s.move(0, [np.eye(4), np.eye(4)]),
+    "transforms: .* coordinates up to": lambda s: s.move(0, np.eye(4)[:3] * 1e30),
+    "object: expected one of": lambda s: s.move(7, np.eye(4)),
+    "instances: expected different integers": lambda s: s.move(0, [np.eye(4)], instances=[1]),
+    "mask: expected 32 bits": lambda s: s.add(box(), mask=1 << 32),
+    "mask: expected 32 bits, got -1 in row 1": lambda s: s.any_hit(HERE, DOWN, mask=[1, -1]),
+    "mask: expected an integer": lambda s: s.closest_hit(HERE, DOWN, mask=0.5),
+    "shown: expected a bool": lambda s: s.show(0, 1),
+    "leaving: expected hits of a scene": lambda s: s.closest_hit(HERE, DOWN, leaving=[0]),
+    "ignore: expected hits of a scene": lambda s: s.closest_hit(HERE, DOWN, ignore=3),
+    "leaving: expected hits on the scene as it is": lambda s: s.any_hit(HERE, DOWN, leaving=before_a_move(s)),
+    "values: expected objects of the scene": lambda s: s.closest_hit(HERE, DOWN).interpolate({5: range(12)}),
+}
+
+
+@cases("fault", FAULTS)
+def test_bad_arguments_are_named_and_change_nothing(fault):
+    scene = RayScene()
+    scene.add(box())
+    with pytest.raises(ValueError, match=fault):
+        FAULTS[fault](scene)
+    assert scene.objects == [0] and scene.closest_hit(HERE, DOWN).t == 8
+
+
+def test_values_of_one_object_are_not_taken_for_those_of_others():
+    scene = RayScene()
+    scene.add(box())
+    assert scene.closest_hit(HERE, DOWN).take(range(12)) == 10
+    scene.add(box())
+    with pytest.raises(ValueError, match="values: expected a dict of object"):
+        scene.closest_hit(HERE, DOWN).take(range(12))
+
+
+def test_a_mesh_that_cannot_be_used_is_refused():
+    with pytest.raises(MeshError):
+        RayScene().add([[0, 0, 0]])
