@@ -27,6 +27,7 @@ from renderer.numerics.simd import (
     load4,
     load8,
     local_floats,
+    local_words,
     maximum,
     narrow,
     offset,
@@ -51,6 +52,7 @@ from renderer.trace.layout import (
     TREE_WORDS,
     WIDE,
 )
+from renderer.trace.packet import child_of, enter_beam, make_beam, meet_octant, middle_entry, most_of, push_sorted
 from renderer.trace.ray_lanes import (
     CHILD,
     LIMIT,
@@ -60,7 +62,7 @@ from renderer.trace.ray_lanes import (
     put_slabs,
 )
 from renderer.trace.rays import ray_at
-from renderer.trace.stack_entry import child_of_entry, distance_of
+from renderer.trace.stack_entry import child_of_entry, distance_of, octant_of
 from renderer.trace.starts.record import IGNORED, MASK
 from renderer.trace.stream import END
 from renderer.trace.ways import Ways
@@ -89,6 +91,9 @@ _LEFT = (-0x800000 << 32) | (_LEAVE & 0xFFFFFFFF)
 # by four times as much, as the distance counts along each axis alone.
 DISTANCE_ROOM = 2.0**-20
 
+# The most instances that a packet finds for its rays, so few that any stack holds them.
+_SHARED = 24
+
 # The rows of lanes that meshes do not use.
 _INSTANCE, _NODES_AT, _BLOCKS_AT, _MASK, _IGNORED = (row * WIDTH for row in range(11, 16))
 # What the roundings of a placed box may cost, as a share of all that is added: eight roundings of float32.
@@ -114,10 +119,33 @@ class ScenePointers(NamedTuple):
     ways: Ways
 
 
-@inlined
-def _are_coherent(rays, begin):
-    """Rays of a scene travel as a stream."""
-    return False
+@kernel
+def _trace_packet(tree, rays, stack, any_hit):
+    """Sixteen rays share the way through the top. The instances that they meet stay on the stack, the nearest last, and
+    the rays go on from there as lanes; from the root if there are more than _SHARED.
+    """
+    beam, floats, nodes, listed = make_beam(rays), rays.floats, tree.nodes, local_words()
+    limit, top, node, count = most_of(floats, LIMIT), np.int64(0), np.int64(0), np.int64(0)
+    while node >= 0:
+        base = node * NODE_WORDS
+        t0, bits = enter_beam(nodes, base, beam, limit)
+        if bits != 0:
+            top = push_sorted(node, bits, t0, middle_entry(nodes, base, beam, rays, t0), stack, top)
+        node = np.int64(-1)
+        while node < 0 and top > 0:
+            top -= 1
+            entry = load(stack, top)
+            child, at_ = child_of(tree, octant_of(entry))
+            if child >= 0:
+                node = child
+            elif count < _SHARED and meet_octant(nodes, rays, at_) != 0:
+                store(listed, count, entry)
+                count += 1
+            elif count == _SHARED:
+                return push_sorted(0, np.int64(0xFF), splat8(np.float32(-np.inf)), splat8(limit), stack, 0), np.int64(0)
+    for k in range(count):
+        store(stack, k, load(listed, count - 1 - k))
+    return count, np.int64(0)
 
 
 @inlined
@@ -475,6 +503,6 @@ def scene_pointers(descriptor):
         np.int64(load(at, INSTANCE_COUNT)), local_floats(), np.int64(0), True, 1.0,
         Ways(
             _corners, _coordinate, _face, _corners_of_face, _child, _boxes, _enter, _begin, _node_of, _resume,
-            _are_coherent,
+            _trace_packet,
         ),
     )  # fmt: skip

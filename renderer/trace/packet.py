@@ -124,7 +124,7 @@ def _least(floats, row):
 
 
 @inlined
-def _most(floats, row):
+def most_of(floats, row):
     a, b = load8(floats, row), load8(floats, row + 8)
     return reduce_max(select(a > b, a, b))
 
@@ -138,7 +138,7 @@ def lowest_origin(floats, axis):
 @inlined
 def highest_origin(floats, axis):
     row = axis * WIDTH
-    return maximum(_most(floats, NEAR_ORIGIN + row), _most(floats, FAR_ORIGIN + row))
+    return maximum(most_of(floats, NEAR_ORIGIN + row), most_of(floats, FAR_ORIGIN + row))
 
 
 @inlined
@@ -150,8 +150,8 @@ def make_beam(rays):
     forward = load(rays.doubles, DIRECTION_Z) > 0.0
     flip = 0 if forward else 8
     low_w, high_w = lowest_origin(floats, w), highest_origin(floats, w)
-    least_u, most_u = _least(floats, SLOPE_U), _most(floats, SLOPE_U)
-    least_v, most_v = _least(floats, SLOPE_V), _most(floats, SLOPE_V)
+    least_u, most_u = _least(floats, SLOPE_U), most_of(floats, SLOPE_U)
+    least_v, most_v = _least(floats, SLOPE_V), most_of(floats, SLOPE_V)
     return Beam(
         16 * w + flip,
         16 * w + 8 - flip,
@@ -209,7 +209,7 @@ def meet_box(nodes, at, floats, half):
 
 
 @inlined
-def _middle_entry(nodes, base, beam, rays, t0):
+def middle_entry(nodes, base, beam, rays, t0):
     """The distances at which a ray in the middle enters the octants; they sort them."""
     floats, middle = rays.floats, WIDTH // 2
     for row in (beam.row_u, beam.row_v):
@@ -249,7 +249,7 @@ def _push_all(node, bits, t0, stack, top):
 
 
 @inlined
-def _next_octant(stack, top, limit):
+def next_octant(stack, top, limit):
     """The topmost octant of the stack that is not beyond the limit, or -1, and the top below it."""
     while top > 0:
         top -= 1
@@ -281,7 +281,7 @@ def trace_packet(tree, rays, stack, any_hit):
     entries.
     """
     beam, floats, nodes = make_beam(rays), rays.floats, tree.nodes
-    limit, unresolved, top, node, left = _most(floats, LIMIT), np.int64(0), np.int64(0), np.int64(0), BUDGET
+    limit, unresolved, top, node, left = most_of(floats, LIMIT), np.int64(0), np.int64(0), np.int64(0), BUDGET
     while True:
         # Push the octants of the node that the beam meets.
         base = node * NODE_WORDS
@@ -290,13 +290,13 @@ def trace_packet(tree, rays, stack, any_hit):
             # rule: packet-stack
             top = _push_all(node, bits, t0, stack, top)
         elif bits != 0:
-            top = push_sorted(node, bits, t0, _middle_entry(nodes, base, beam, rays, t0), stack, top)
+            top = push_sorted(node, bits, t0, middle_entry(nodes, base, beam, rays, t0), stack, top)
         # Take octants off the stack and test their leaves, until one leads to a node.
         while True:
             if left == 0:
                 return top, unresolved
             left -= 1
-            octant, top = _next_octant(stack, top, limit)
+            octant, top = next_octant(stack, top, limit)
             if octant < 0:
                 return top, unresolved
             node, at = child_of(tree, octant)
@@ -306,7 +306,7 @@ def trace_packet(tree, rays, stack, any_hit):
             if meeting != 0:
                 unresolved |= test_leaf(tree, rays, meeting, node, any_hit)
                 # rule: packet-limit
-                limit = _most(floats, LIMIT)
+                limit = most_of(floats, LIMIT)
 
 
 @inlined

@@ -11,7 +11,7 @@ from renderer.trace.best import NO_FACE, no_hit
 from renderer.trace.intersect import largest_of, make_shear
 from renderer.trace.layout import cache_aligned
 from renderer.trace.leaf import search_all_blocks
-from renderer.trace.packet import child_of, meet_octant, trace_packet
+from renderer.trace.packet import are_coherent, child_of, meet_octant
 from renderer.trace.ray_lanes import (
     DIRECTION_Z,
     GROUP_STRIDE,
@@ -215,7 +215,7 @@ def _trace_sixteen(tree, query, first):
         store(numbers, r, first + r)
     for half in range(0, WIDTH, 8):
         prepare_eight(query.rays, prepared, half, offset(numbers, half))
-    top, unresolved = trace_packet(tree, prepared, query.scratch.packet_stack, query.any_hit)
+    top, unresolved = tree.ways.trace_packet(tree, prepared, query.scratch.packet_stack, query.any_hit)
     if top > 0:
         return _hand_over(tree, query, top, unresolved)
     for r in range(WIDTH):
@@ -258,7 +258,7 @@ def _trace_on(tree, query, progress, end):
     """``trace`` for more rays; returns the ``Progress`` after them."""
     rounds, following, count, waiting = np.int64(0), progress.following, progress.count, query.scratch.waiting
     for first in range(progress.begin, end, WIDTH):
-        if first + WIDTH <= end and tree.ways.are_coherent(query.rays, first):
+        if first + WIDTH <= end and are_coherent(query.rays, first):
             rounds += _trace_sixteen(tree, query, first)
             if rounds > _WORK:
                 return Progress(first + WIDTH, following, count)

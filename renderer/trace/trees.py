@@ -12,7 +12,7 @@ from renderer.trace.edge_signs import coordinate_of_block
 from renderer.trace.instances import scene_pointers
 from renderer.trace.intersect import corners_of_block, face_of_block
 from renderer.trace.layout import BLOCK_COUNT, BLOCKS, DEPTH, FACES, NODES, SCALE, WIDE
-from renderer.trace.packet import are_coherent
+from renderer.trace.packet import trace_packet
 from renderer.trace.single_ray import enter_node_of_tree
 from renderer.trace.starts.record import corners_of_mesh
 from renderer.trace.stream import begin_in_tree, node_in_tree, resume_in_tree
@@ -54,7 +54,7 @@ def _mesh_pointers(descriptor):
         double_of(load(at, SCALE)),
         Ways(
             corners_of_block, coordinate_of_block, face_of_block, corners_of_mesh, child_of_node, boxes_of_node,
-            enter_node_of_tree, begin_in_tree, node_in_tree, resume_in_tree, are_coherent,
+            enter_node_of_tree, begin_in_tree, node_in_tree, resume_in_tree, trace_packet,
         ),
     )  # fmt: skip
 

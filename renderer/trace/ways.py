@@ -18,7 +18,7 @@ class Ways(NamedTuple):
     begin            begin(tree, rays, prepared, r, number): what a lane keeps of a ray beside ``ray_lanes.prepare_ray``
     node_of          node_of(tree, prepared, r): nodes, links and the place of the node that a lane is at
     resume           resume(tree, rays, prepared, lanes, r): ``stream.resume``
-    are_coherent     are_coherent(rays, begin): whether sixteen rays begin as a packet
+    trace_packet     trace_packet(tree, rays, stack, any_hit): ``packet.trace_packet``
     """
 
     corners: Any
@@ -31,4 +31,4 @@ class Ways(NamedTuple):
     begin: Any
     node_of: Any
     resume: Any
-    are_coherent: Any
+    trace_packet: Any

@@ -59,6 +59,16 @@ def make_scene(seed, threads=1):
     return scene
 
 
+def camera_rays(mesh, seed):
+    """Rays from one place through a film, sixteen and more of which travel together."""
+    rng, (lower, upper) = np.random.default_rng(seed), mesh.bounds
+    across = np.linspace(-0.3, 0.3, 20)
+    x, y = np.meshgrid(across, across)
+    directions = np.stack([x.ravel(), y.ravel(), -np.ones(x.size)], axis=1) @ rotation(rng)
+    away = directions.mean(axis=0) * np.linalg.norm(upper - lower) * rng.uniform(0.2, 1.5)
+    return (lower + upper) / 2 - away, directions
+
+
 def assert_like_merged(scene, seed):
     """Every query has the bits of the merged mesh."""
     merged = Octree(scene.merged, threads=1)
@@ -71,6 +81,10 @@ def assert_like_merged(scene, seed):
     few, alike = (one.closest_hit(origins[:9], directions[:9]) for one in (scene, merged))
     assert_same_hits(few._found, alike)
     np.testing.assert_array_equal(scene.any_hit(origins, directions), expected.hit)
+
+    camera = camera_rays(merged.mesh, seed)
+    assert_same_hits(scene.closest_hit(*camera)._found, merged.closest_hit(*camera))
+    np.testing.assert_array_equal(scene.any_hit(*camera), merged.any_hit(*camera))
 
     several, others = (one.all_hits(origins, directions, t_error=True) for one in (scene, merged))
     for name in ("t", "t_error", "side", "offsets"):
