@@ -13,10 +13,10 @@ from renderer.mesh.mesh import Mesh
 from renderer.rayscene.built import BuiltScene
 from renderer.rayscene.hits import SceneHits
 from renderer.results.hits import Hits, Passage
-from renderer.trace.batch import ALL, NO_STARTS, RayBatch, check_rays, offset_origins, whole_numbers
+from renderer.trace.batch import NO_STARTS, RayBatch, check_rays, offset_origins, whole_numbers
 from renderer.trace.instances import MASK_BITS
 from renderer.trace.leaving import check_leaving, shapes_of_starts
-from renderer.trace.starts.record import FACE, HEAD, IGNORED, MASK, ROW, ROW_STEP
+from renderer.trace.starts.record import ALL, FACE, HEAD, IGNORED, MASK, ROW, ROW_STEP
 
 Leaving = SceneHits | Passage | None
 

@@ -14,7 +14,7 @@ from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.system.threads import for_chunks
 from renderer.trace.spawn import FARTHEST_START, offset_from_faces
-from renderer.trace.starts.record import FACE, FACES, HEAD, IGNORED, MASK, ROW, ROW_STEP, VERTICES
+from renderer.trace.starts.record import ALL, FACE, FACES, HEAD, IGNORED, MASK, ROW, ROW_STEP, VERTICES
 
 # The most rays of a chunk: small enough to share 1e5 rays between many threads and to stop within milliseconds on
 # Ctrl-C, large enough that taking a chunk costs nothing beside its 1 to 10 ms of tracing.
@@ -49,10 +49,6 @@ def _bound(argument: str, given: NDArray[Any], shape: tuple[int, ...], largest: 
         row = int((~good).argmax())
         expect(False, argument, f"numbers from 0 to {largest:.3g}", f"{array[row]} in row {row}")
     return array
-
-
-# The mask of a ray that may hit every instance.
-ALL = float((1 << 32) - 1)
 
 
 def _no_starts() -> NDArray[np.int64]:

@@ -25,7 +25,7 @@ from renderer.numerics.simd import (
 )
 from renderer.trace.best import NO_FACE
 from renderer.trace.intersect import Ray
-from renderer.trace.starts.record import FACE, IGNORED, MASK, SLACK, StartPointers, start_pointers
+from renderer.trace.starts.record import ALL, FACE, IGNORED, MASK, SLACK, StartPointers, start_pointers
 
 _MOST, _TINIEST = np.finfo(np.float64).max, 2.0**-1074
 _BYTES = 8
@@ -148,13 +148,13 @@ def ray_at(rays, i):
 
 @inlined
 def eight_rays_at(rays, numbers):
-    """``ray_at`` of the eight rays numbered at ``numbers``, as vectors."""
+    """``ray_at`` of the eight rays numbered at ``numbers``, as vectors; without what only ``Ways.begin`` reads."""
     o, d, s, z = rays.origins, rays.directions, rays.origin_step, rays.direction_step
     origin = gather8(o, numbers, s, 0), gather8(o, numbers, s, 1), gather8(o, numbers, s, 2)
     direction = gather8(d, numbers, z, 0), gather8(d, numbers, z, 1), gather8(d, numbers, z, 2)
     # rule: ends-of-eight
     t_min, t_max = _often_one(rays.t_min, numbers, rays.min_step, 0), _often_one(rays.t_max, numbers, rays.max_step, 0)
-    return _scaled(origin, direction, t_min, t_max, rays.scale, *starts8(rays.starts, numbers))
+    return _scaled(origin, direction, t_min, t_max, rays.scale, *starts8(rays.starts, numbers), ALL, -1.0)
 
 
 @inlined
@@ -166,12 +166,9 @@ def _often_one(base, numbers, step, column):
 
 @inlined
 def starts8(starts, numbers):
-    """Slack, face, mask and the instance ignored, as in ``Ray``, of the eight rays numbered at ``numbers``."""
+    """Slack and face, as in ``Ray``, of the eight rays numbered at ``numbers``."""
     rows, step = starts.rows, starts.step
-    return (
-        _often_one(rows, numbers, step, SLACK), _often_one(rows, numbers, step, FACE),
-        _often_one(rows, numbers, step, MASK), _often_one(rows, numbers, step, IGNORED),
-    )  # fmt: skip
+    return _often_one(rows, numbers, step, SLACK), _often_one(rows, numbers, step, FACE)
 
 
 @inlined

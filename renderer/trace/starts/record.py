@@ -16,6 +16,8 @@ ROW_STEP, VERTICES, FACES, HEAD = 0, 1, 2, 8
 # through the face, PILE: the first of the faces that coincide there; and the way back, a direction that
 # is on the side where the ray starts. Then mask and instance ignored, as of ``intersect.Ray``.
 SLACK, FACE, CODE, ANCHOR, PILE, WAY, MASK, IGNORED, ROW = 0, 1, 2, 3, 5, 6, 9, 10, 11
+# The mask of a ray that may hit every instance.
+ALL = float((1 << 32) - 1)
 # The slack of a ray that no search takes as it is: ``search.search_from`` decides.
 EDGE = np.inf
 # The bits of a code: the side of the face that the ray starts on is known, and is that of its normal; the ray came
