@@ -136,7 +136,8 @@ def _list_hits(tree, query, first, blocks, count):
             i = lowest_bit(bits)
             bits &= bits - 1
             edges, hit = _edges_at(tree, block, hits, i, shear), resolved_hit(tree, block, hits, i, ray, shear)
-            count = _add_hit(tree, query, count, hit, block, i, edges)
+            if tree.ways.admits(tree, hit.w, shear.direction_z):
+                count = _add_hit(tree, query, count, hit, block, i, edges)
     return count, False
 
 

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from copy import copy
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.errors import expect
+from renderer.errors import expect, expect_known
 from renderer.lazy import lazy
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.queryable import Built
 from renderer.rayscene.placing import box_all, corners_of_faces, locate
 from renderer.system.threads import for_chunks
+from renderer.trace.batch import NO_STARTS, RayBatch
 from renderer.trace.instances import (
+    FACING,
     FIRST_FACE,
     FLAGS,
     HALF,
@@ -24,6 +27,7 @@ from renderer.trace.instances import (
     INSTANCE_COUNT,
     INSTANCE_WORDS,
     INSTANCES,
+    MASK_BITS,
     MATRIX,
     MESH_FACES,
     MIDDLE,
@@ -34,12 +38,14 @@ from renderer.trace.instances import (
     TOP_NODES,
     VERTICES,
 )
-from renderer.trace.layout import BLOCK_WORDS, CHILDREN, LEAF_BITS, NODE_WORDS, TREE_WORDS, UNUSED, cache_aligned
+from renderer.trace.layout import BLOCK_WORDS, CHILDREN, LEAF_BITS, NODE_WORDS, TREE_WORDS, UNUSED, Tree, cache_aligned
 from renderer.tree.build import SPLITS, build_nodes, new_faces
 from renderer.tree.hierarchy import Rule
 
 # The faces of a scene are numbered by int32, and the largest number means none.
 MOST_FACES = np.iinfo(np.int32).max - 1
+# The sides of faces that rays may hit, as ``trace.instances`` numbers them.
+SIDES = ("both", "front", "back")
 # A block and the place in it share a number with the instance.
 _MOST_BLOCKS = (1 << NUMBER_BITS) // BLOCK_WORDS
 # Faces that are looked for together: a tenth of a millisecond.
@@ -88,6 +94,16 @@ class SceneTree:
         self.members, self.instances = members, instances
         self.nodes, levels = _top(instances, words, shown, threads)
         self.depth = levels + max((member.built.tree.depth for member in members), default=0) + 1
+
+    def facing(self, faces: str) -> SceneTree:
+        """The same for rays that hit the sides ``faces`` only."""
+        expect_known("faces", faces, SIDES)
+        if faces == SIDES[0]:
+            return self
+        tree = copy(self)
+        tree.descriptor = self.descriptor.copy()
+        tree.descriptor[FACING] = SIDES.index(faces)
+        return tree
 
     @lazy
     def descriptor(self) -> NDArray[np.uint64]:
@@ -147,6 +163,19 @@ class BuiltScene:
     def tree(self) -> Any:
         """What queries take for the tree."""
         return self.top
+
+    def tree_for(self, rays: RayBatch, faces: str) -> Any:
+        """The tree to trace rays against: that of a mesh that stands alone, where it is, as far as that is enough."""
+        top = self.top.facing(faces)
+        return self._alone if top is self.top and rays.starts is NO_STARTS and self._alone is not None else top
+
+    @lazy
+    def _alone(self) -> Tree | None:
+        if len(self.top.instances) != 1 or len(self.members[0].built.mesh.faces) == 0:
+            return None
+        plain = self.top.instances.view(np.int64)[0, FLAGS] == MASK_BITS
+        (matrix,) = self.matrices(self.members[0])
+        return self.members[0].built.tree if plain and (matrix == np.eye(3, 4)).all() else None
 
     @lazy
     def count(self) -> int:

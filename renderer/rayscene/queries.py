@@ -25,6 +25,8 @@ from renderer.trace.error import errors_of
 from renderer.trace.instances import MASK_BITS
 from renderer.trace.steps import count_steps
 
+Sides = Literal["both", "front", "back"]
+
 
 class SceneQueries:
     """Queries of a scene; safe to call from many threads at once."""
@@ -45,6 +47,7 @@ class SceneQueries:
         *,
         mask: ArrayLike = MASK_BITS,
         ignore: SceneHits | None = None,
+        faces: Sides = "both",
         t_error: bool = False,
     ) -> SceneHits:
         """Return the nearest hit of each ray in the closed interval [t_min, t_max].
@@ -62,6 +65,8 @@ class SceneQueries:
             32 bits: a ray meets an instance if the instance's mask has one of them too.
         ignore : SceneHits, shape (...), optional
             Each ray passes through the instance that was hit there, such as the body that a sensor is part of.
+        faces : {"both", "front", "back"}, default "both"
+            The sides of faces that rays hit: "front" that of the normal, by the right-hand rule. Not with ``leaving``.
         t_error : bool, default False
             Also bound the rounding error of each t, in ``hits.t_error``.
 
@@ -87,8 +92,8 @@ class SceneQueries:
         array([ 1,  0,  0])
         """
         built = self._built
-        rays, shape = rays_of(built, origins, directions, t_min, t_max, Choice(leaving, mask, ignore))
-        hits = closest_hits(built.tree, rays, built.mesh, self.threads)
+        rays, shape = rays_of(built, origins, directions, t_min, t_max, Choice(leaving, mask, ignore, faces))
+        hits = closest_hits(built.tree_for(rays, faces), rays, built.mesh, self.threads)
         if flag_argument("t_error", t_error):
             _add_errors(built, hits, rays, None, self.threads)
         return SceneHits(hits.shaped(shape), built)
@@ -103,12 +108,13 @@ class SceneQueries:
         *,
         mask: ArrayLike = MASK_BITS,
         ignore: SceneHits | None = None,
+        faces: Sides = "both",
     ) -> NDArray[np.bool_]:
         """Return whether each ray hits anything in the closed interval [t_min, t_max].
 
         Parameters
         ----------
-        origins, directions, t_min, t_max, leaving, mask, ignore
+        origins, directions, t_min, t_max, leaving, mask, ignore, faces
             As for ``closest_hit``.
 
         Returns
@@ -125,8 +131,8 @@ class SceneQueries:
         array([ True, False])
         """
         built = self._built
-        rays, shape = rays_of(built, origins, directions, t_min, t_max, Choice(leaving, mask, ignore))
-        return any_hits(built.tree, rays, self.threads).reshape(shape)
+        rays, shape = rays_of(built, origins, directions, t_min, t_max, Choice(leaving, mask, ignore, faces))
+        return any_hits(built.tree_for(rays, faces), rays, self.threads).reshape(shape)
 
     def all_hits(
         self,
@@ -138,6 +144,7 @@ class SceneQueries:
         *,
         mask: ArrayLike = MASK_BITS,
         ignore: SceneHits | None = None,
+        faces: Sides = "both",
         contacts: bool = True,
         max_hits: int | None = None,
         t_error: bool = False,
@@ -146,7 +153,7 @@ class SceneQueries:
 
         Parameters
         ----------
-        origins, directions, t_min, t_max, leaving, mask, ignore
+        origins, directions, t_min, t_max, leaving, mask, ignore, faces
             As for ``closest_hit``.
         contacts, max_hits, t_error
             As for ``Octree.all_hits``.
@@ -165,8 +172,8 @@ class SceneQueries:
         array([8., 9.])
         """
         built = self._built
-        rays, shape = rays_of(built, origins, directions, t_min, t_max, Choice(leaving, mask, ignore))
-        hits = all_hits(built.tree, rays, built.mesh, contacts, max_hits, shape, self.threads)
+        rays, shape = rays_of(built, origins, directions, t_min, t_max, Choice(leaving, mask, ignore, faces))
+        hits = all_hits(built.tree_for(rays, faces), rays, built.mesh, contacts, max_hits, shape, self.threads)
         if flag_argument("t_error", t_error):
             _add_errors(built, hits, rays, hits.ray, self.threads)
         return SceneAllHits(hits, built)
@@ -181,13 +188,14 @@ class SceneQueries:
         *,
         mask: ArrayLike = MASK_BITS,
         ignore: SceneHits | None = None,
+        faces: Sides = "both",
         contacts: bool = True,
     ) -> NDArray[np.int64]:
         """Return the number of hits that ``all_hits`` has for each ray.
 
         Parameters
         ----------
-        origins, directions, t_min, t_max, leaving, mask, ignore, contacts
+        origins, directions, t_min, t_max, leaving, mask, ignore, faces, contacts
             As for ``all_hits``.
 
         Returns
@@ -204,8 +212,8 @@ class SceneQueries:
         array([2, 0])
         """
         built = self._built
-        rays, shape = rays_of(built, origins, directions, t_min, t_max, Choice(leaving, mask, ignore))
-        return count_hits(built.tree, rays, contacts, self.threads).reshape(shape)
+        rays, shape = rays_of(built, origins, directions, t_min, t_max, Choice(leaving, mask, ignore, faces))
+        return count_hits(built.tree_for(rays, faces), rays, contacts, self.threads).reshape(shape)
 
     def count_steps(
         self,
@@ -217,12 +225,13 @@ class SceneQueries:
         *,
         mask: ArrayLike = MASK_BITS,
         ignore: SceneHits | None = None,
+        faces: Sides = "both",
     ) -> Steps:
         """Return how many nodes and triangles the search for each ray's closest hit tests, as ``Octree.count_steps``.
 
         Parameters
         ----------
-        origins, directions, t_min, t_max, leaving, mask, ignore
+        origins, directions, t_min, t_max, leaving, mask, ignore, faces
             As for ``closest_hit``.
 
         Returns
@@ -239,8 +248,8 @@ class SceneQueries:
         array(True)
         """
         built = self._built
-        rays, shape = rays_of(built, origins, directions, t_min, t_max, Choice(leaving, mask, ignore))
-        return count_steps(built.tree, rays, shape, self.threads)
+        rays, shape = rays_of(built, origins, directions, t_min, t_max, Choice(leaving, mask, ignore, faces))
+        return count_steps(built.tree_for(rays, faces), rays, shape, self.threads)
 
     def contains(
         self,

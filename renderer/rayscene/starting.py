@@ -26,13 +26,16 @@ class Choice(NamedTuple):
 
     leaving: Leaving
     mask: ArrayLike
-    ignore: SceneHits | ArrayLike | None
+    ignore: SceneHits | None
+    faces: str
 
 
 def rays_of(
     scene: BuiltScene, origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike, t_max: ArrayLike, choice: Choice
 ) -> tuple[RayBatch, tuple[int, ...]]:
     """The arguments of a query, checked, and the dimensions of the rays."""
+    plain = choice.leaving is None or choice.faces == "both"
+    expect(plain, "faces", "'both' with leaving", repr(choice.faces))
     leaving, ignored = _on_faces(scene, choice.leaving), _ignored(scene, choice.ignore)
     shapes = shapes_of_starts(leaving, None) if leaving is not None else {}
     mask = np.asarray(choice.mask)
@@ -75,12 +78,11 @@ def _masks(mask: NDArray[Any], shape: tuple[int, ...]) -> NDArray[np.float64]:
     return rows.astype(np.float64)
 
 
-def _ignored(scene: BuiltScene, ignore: SceneHits | ArrayLike | None) -> NDArray[np.float64] | None:
+def _ignored(scene: BuiltScene, ignore: SceneHits | None) -> NDArray[np.float64] | None:
     """The instance, counted from 1 among all, that each ray does not hit, (...); -1 for none."""
     if ignore is None:
         return None
     expect(isinstance(ignore, SceneHits), "ignore", "hits of a scene", type(ignore).__name__)
-    assert isinstance(ignore, SceneHits)
     begins = {m.id: (m.begin, m.count) for m in scene.members}
     ignored = np.full(ignore.object.shape, -1.0)
     for id_ in np.unique(ignore.object[ignore.object >= 0]).tolist():

@@ -43,6 +43,20 @@ def hit_on(face, hit):
 
 
 @inlined
+def admits_all(tree, w, dz):
+    """``Ways.admits`` of a mesh: no face is culled."""
+    return True
+
+
+@inlined
+def side_of(w, dz):
+    """The side of a face that a ray came from, 1 that of the normal, -1 the other: by the sign of a hit's w and that of
+    the ray's ``Shear.direction_z``.
+    """
+    return 1 if (w > 0.0) == (dz > 0.0) else -1
+
+
+@inlined
 def is_better(t, face, t_min, best):
     """Whether a hit counts and comes before the best one: a smaller t, or the same t and a lower face."""
     return t >= t_min and (t < best.t or (t == best.t and face < best.face))

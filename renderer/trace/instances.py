@@ -38,6 +38,7 @@ from renderer.numerics.simd import (
     store,
 )
 from renderer.numerics.vec3 import row3, scale
+from renderer.trace.best import side_of
 from renderer.trace.intersect import Slabs, enter_boxes, largest_of, make_slab, make_slabs, room_of
 from renderer.trace.layout import (
     BLOCK_WORDS,
@@ -77,8 +78,9 @@ MATRIX, INVERSE, PLACE, ROOM, OBJECT, FIRST_FACE, FLAGS, INSTANCE_WORDS = 0, 12,
 # The bits of flags: the mask below, whether the matrix mirrors, and whether no ray sees the instance.
 MIRRORS, HIDDEN = 1 << 32, 1 << 33
 MASK_BITS = (1 << 32) - 1
-# A scene, as kernels get it, uint64: addresses of the top's nodes and of the instances, and their number.
-TOP_NODES, INSTANCES, INSTANCE_COUNT, SCENE_WORDS = range(4)
+# A scene, as kernels get it, uint64: addresses of the top's nodes and of the instances; their number; and the sides of
+# faces that rays hit: 0 both, 1 that of the normal, 2 the other.
+TOP_NODES, INSTANCES, INSTANCE_COUNT, FACING, SCENE_WORDS = range(5)
 
 # An instance in the number of a node or block, and of a slot, four times as large.
 NUMBER_BITS = 32
@@ -102,8 +104,14 @@ _LINE = CACHE_LINE // 4
 
 
 class ScenePointers(NamedTuple):
-    """A scene as the traversal reads it: the nodes of its top, also as links and by their address; the instances as
-    float64 and as int64, and their number; room for a node's boxes; and the rest as of ``trees.TreePointers``.
+    """A scene as the traversal reads it.
+
+    nodes, links, top          the nodes of its top, the same as links, and their address
+    instances, words           the instances as float64 and as int64
+    instance_count             their number
+    facing                     the sides of faces that rays hit
+    boxes                      room for a node's boxes
+    count, has_nodes, scale, ways  as of ``trees.TreePointers``
     """
 
     nodes: Any
@@ -112,11 +120,18 @@ class ScenePointers(NamedTuple):
     instances: Any
     words: Any
     instance_count: int
+    facing: int
     boxes: Any
     count: int  # type: ignore[assignment]  # tuples have a method of that name
     has_nodes: bool
     scale: float
     ways: Ways
+
+
+@inlined
+def _admits(tree, w, dz):
+    # rule: facing
+    return tree.facing == 0 or (tree.facing == 1) == (side_of(w, dz) > 0)
 
 
 @kernel
@@ -500,9 +515,9 @@ def scene_pointers(descriptor):
     nodes, instances = np.int64(load(at, TOP_NODES)), np.int64(load(at, INSTANCES))
     return ScenePointers(
         float32_pointer(nodes), int32_pointer(nodes), nodes, float64_pointer(instances), int64_pointer(instances),
-        np.int64(load(at, INSTANCE_COUNT)), local_floats(), np.int64(0), True, 1.0,
+        np.int64(load(at, INSTANCE_COUNT)), np.int64(load(at, FACING)), local_floats(), np.int64(0), True, 1.0,
         Ways(
             _corners, _coordinate, _face, _corners_of_face, _child, _boxes, _enter, _begin, _node_of, _resume,
-            _trace_packet,
+            _admits, _trace_packet,
         ),
     )  # fmt: skip

@@ -70,7 +70,7 @@ def nearest_carefully(tree, first, count, ray, shear, best):
             i = lowest_bit(bits)
             bits &= bits - 1
             face, hit = face_in(tree, block * BLOCK_FACES + i), resolved_hit(tree, block, hits, i, ray, shear)
-            if is_better(hit.t, face, ray.t_min, best):
+            if is_better(hit.t, face, ray.t_min, best) and tree.ways.admits(tree, hit.w, shear.direction_z):
                 best = hit_on(face, hit)
     return best
 

@@ -23,7 +23,7 @@ from renderer.numerics.simd import (
     select,
     store,
 )
-from renderer.trace.best import NO_FACE
+from renderer.trace.best import NO_FACE, side_of
 from renderer.trace.intersect import Ray
 from renderer.trace.starts.record import ALL, FACE, IGNORED, MASK, SLACK, StartPointers, start_pointers
 
@@ -200,4 +200,4 @@ def write_hit(found, i, scale, best, dz, any_hit):
     store(found.v, i, v / w + 0.0 if hit else np.nan)
     # In this order, as those that keep no piles give the sides' memory for them.
     store(found.pile, i, np.int64(face if hit else -1))
-    store(found.side, i, np.int64((1 if (w > 0.0) == (dz > 0.0) else -1) if hit else 0))
+    store(found.side, i, np.int64(side_of(w, dz) if hit else 0))

@@ -24,11 +24,12 @@ from renderer.numerics.simd import (
     splat8,
     store,
 )
-from renderer.trace.best import Best
+from renderer.trace.best import NO_FACE, Best
 from renderer.trace.intersect import box_limit, face_in, meet_boxes, meet_planes, see_triangles
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CACHE_LINE, CHILDREN, MAX_LEAF_BLOCKS, NODE_WORDS
 from renderer.trace.ray_lanes import (
     CHILD,
+    DIRECTION_Z,
     LARGEST,
     LIMIT,
     LOWER,
@@ -272,14 +273,14 @@ def take_hits(tree, rays, lanes, k):
     while bits != 0:
         i = lowest_bit(bits)
         bits &= bits - 1
-        ti, fi = load(hits, i), face_in(tree, block * BLOCK_FACES + i)
+        ti, fi, wi = load(hits, i), face_in(tree, block * BLOCK_FACES + i), load(hits, 3 * BLOCK_FACES + i)
         # rule: tie-in-streams
-        if ti < t or (ti == t and fi < face):
+        if (ti < t or (ti == t and fi < face)) and tree.ways.admits(tree, wi, load(rays.doubles, DIRECTION_Z + r)):
             t, face = ti, fi
-            u, v, w = load(hits, BLOCK_FACES + i), load(hits, 2 * BLOCK_FACES + i), load(hits, 3 * BLOCK_FACES + i)
+            u, v, w = load(hits, BLOCK_FACES + i), load(hits, 2 * BLOCK_FACES + i), wi
     put_best(rays, r, Best(t, face, u, v, w))
     store(rays.floats, LIMIT + r, box_limit(t, load(rays.doubles, LARGEST + r)))
-    return True
+    return face != NO_FACE
 
 
 @inlined

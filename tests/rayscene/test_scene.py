@@ -11,6 +11,7 @@ from meshes import KINDS, assert_same_hits, make_mesh, rays_at
 
 from renderer import Mesh, MeshError, Octree, RayScene
 from renderer.mesh.shapes import box, icosphere
+from renderer.trace.batch import check_rays
 
 pytestmark = pytest.mark.judges(
     "RayScene", "RayScene.add", "RayScene.all_hits", "RayScene.any_hit", "RayScene.closest_hit",
@@ -226,6 +227,43 @@ def first_of(scene, origins, aims, hits):
     return scene.closest_hit(origins[hits.hit], aims[hits.hit])
 
 
+@cases("repeats", [1, 10])
+def test_rays_hit_the_sides_of_faces_that_they_are_asked_to(repeats):
+    """A box has fronts outside; mirrored it has them outside too, and a box inside out has them inside."""
+    scene, mirrored = RayScene(), [[-1, 0, 0, 6], [0, 1, 0, 0], [0, 0, 1, 0]]
+    scene.add(box(), [np.eye(4)[:3], mirrored])
+    inside_out = Mesh(box().vertices, box().faces[:, ::-1])
+    scene.add(inside_out, [[1, 0, 0, 9], [0, 1, 0, 0], [0, 0, 1, 0]])
+    origins = np.repeat([[0.3, 0.4, 9.0], [5.3, 0.4, 9.0], [9.3, 0.4, 9.0]], repeats, axis=0)
+    found = {side: scene.closest_hit(origins, [0, 0, -1], faces=side) for side in ("both", "front", "back")}
+    assert {side: hits.t[::repeats].round(9).tolist() for side, hits in found.items()} == {
+        "both": [8, 8, 8], "front": [8, 8, 9], "back": [9, 9, 8],
+    }  # fmt: skip
+    assert (found["front"].side == 1).all() and (found["back"].side == -1).all()
+    assert (
+        scene.any_hit(origins, [0, 0, -1], t_max=8.5, faces="back").tolist()
+        == np.repeat([False, False, True], repeats).tolist()
+    )
+    assert scene.all_hits(origins, [0, 0, -1], faces="front").t.round(9).tolist() == [8] * 2 * repeats + [9] * repeats
+    assert (scene.count_hits(origins, [0, 0, -1], faces="back") == 1).all()
+
+
+def test_a_mesh_that_stands_alone_has_the_hits_of_its_octree():
+    octree, scene, rng = Octree(icosphere(3)), RayScene(), np.random.default_rng(5)
+    scene.add(octree)
+    origins, directions = rng.normal(size=(2, 500, 3))
+    assert scene._built.tree_for(check_rays(origins, directions, 0.0, np.inf)[0], "both") is octree.tree
+    hits, expected = (one.closest_hit(origins, directions) for one in (scene, octree))
+    assert_same_hits(hits._found, expected)
+    np.testing.assert_array_equal(hits.face, expected.face)
+    # Where it is moved, or hidden, it is no longer itself.
+    scene.move(0, [[1, 0, 0, 4], [0, 1, 0, 0], [0, 0, 1, 0]])
+    moved = scene.closest_hit(origins + np.array([4.0, 0.0, 0.0]), directions)
+    np.testing.assert_array_equal(moved.hit, expected.hit)
+    scene.show(0, False)
+    assert not scene.any_hit(origins, directions).any()
+
+
 def test_hidden_instances_are_hit_by_nothing_and_keep_their_numbers():
     scene = RayScene()
     cubes = scene.add(box(), [[[1, 0, 0, 2 * k], [0, 1, 0, 0], [0, 0, 1, 0]] for k in range(3)])
@@ -324,6 +362,10 @@ FAULTS = {
     "leaving: expected hits of a scene": lambda s: s.closest_hit(HERE, DOWN, leaving=[0]),
     "ignore: expected hits of a scene": lambda s: s.closest_hit(HERE, DOWN, ignore=3),
     "leaving: expected hits on the scene as it is": lambda s: s.any_hit(HERE, DOWN, leaving=before_a_move(s)),
+    "faces: expected one of": lambda s: s.any_hit(HERE, DOWN, faces="inside"),
+    "faces: expected 'both' with leaving": lambda s: s.any_hit(
+        HERE, DOWN, leaving=s.closest_hit(HERE, DOWN), faces="front"
+    ),
     "values: expected objects of the scene": lambda s: s.closest_hit(HERE, DOWN).interpolate({5: range(12)}),
 }
 
