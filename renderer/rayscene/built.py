@@ -182,6 +182,11 @@ class BuiltScene:
         """The number of faces of all instances."""
         return sum(m.count * len(m.built.mesh.faces) for m in self.members)
 
+    def flags(self, member: Member) -> NDArray[np.int64]:
+        """The masks of a member's instances, with HIDDEN of those that are not shown."""
+        own = self.top.instances.view(np.int64)[member.begin : member.begin + member.count, FLAGS]
+        return own & (MASK_BITS | HIDDEN)
+
     @property
     def mesh(self) -> Any:
         """What queries take for the mesh."""

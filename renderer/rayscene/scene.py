@@ -15,7 +15,7 @@ from renderer.errors import expect
 from renderer.mesh.foreign import TriangleMesh
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree, as_mesh
-from renderer.queryable import Queries
+from renderer.queryable import Built, Queries
 from renderer.rayscene.built import (
     BuiltScene,
     Member,
@@ -112,15 +112,64 @@ class RayScene(SceneQueries):
         (0, 1)
         """
         octree = mesh if isinstance(mesh, Octree) else Octree(as_mesh(mesh, None, False)[0], threads=self.threads)
-        built = octree._built
         matrices = _matrices(transforms)
+        name = octree.mesh.name if name is None else name
+        return self._add(octree._built, name, matrices, _masks(mask, len(matrices)))
+
+    def add_scene(self, scene: RayScene, transforms: ArrayLike | None = None) -> dict[int, int]:
+        """Add all objects of another scene, as it is now, once or many times; meshes are shared.
+
+        An instance of an object stands at the product of both matrices, and is placed once by it. The instances of the
+        first copy come first, in their order, then those of the next.
+
+        Parameters
+        ----------
+        scene : RayScene
+        transforms : array_like, shape (3, 4), (4, 4), (k, 3, 4) or (k, 4, 4), optional
+            Where the scene stands: once, or k times. None leaves it where it is.
+
+        Returns
+        -------
+        dict of int to int
+            The number here of each object there.
+
+        Raises
+        ------
+        ValueError
+            As for ``add``; then nothing is added.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> tower, town = RayScene(), RayScene()
+        >>> floors = tower.add(box(), [[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, z]] for z in range(3)])
+        >>> town.add_scene(tower, [[[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 0]] for x in (0, 5)])
+        {0: 0}
+        >>> town.closest_hit([5.5, 0.25, 9], [0, 0, -1]).instance
+        array(5)
+        """
+        outer, there = _matrices(transforms), scene._built
         with self._lock:
-            begin = len(self._instances)
-            member = Member(self._next, built.mesh.name if name is None else name, built, begin, len(matrices))
+            before = self._members, self._instances, self._snapshot, self._next
+            try:
+                return {
+                    m.id: self._add(
+                        m.built, m.name, _composed(outer, there.matrices(m)), np.tile(there.flags(m), len(outer))
+                    )
+                    for m in there.members
+                }
+            except ValueError:
+                self._members, self._instances, self._snapshot, self._next = before
+                raise
+
+    def _add(self, built: Built, name: str, matrices: NDArray[np.float64], flags: NDArray[np.int64]) -> int:
+        with self._lock:
+            member = Member(self._next, name, built, len(self._instances), len(matrices))
             members = [*self._members, member]
             check_sizes(members)
             own = new_records(len(matrices))
-            own.view(np.int64)[:, FLAGS] = _masks(mask, len(matrices))
+            own.view(np.int64)[:, FLAGS] = flags
             _place(member, own, matrices)
             self._change(members, np.concatenate([self._instances, own]))
             self._next += 1
@@ -357,6 +406,15 @@ def _matrices(transforms: ArrayLike | None) -> NDArray[np.float64]:
         row = int((~good).argmax())
         expect(False, "transforms", "finite matrices, the last row 0 0 0 1", f"{matrices[row].tolist()} in row {row}")
     return np.ascontiguousarray(matrices[:, :3])
+
+
+def _composed(outer: NDArray[np.float64], inner: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The products (k * n, 3, 4) of k maps and n maps, which are applied first."""
+    a, b = outer[:, None], inner[None]
+    # Term by term, as in ``Mesh.transformed``.
+    product = (a[..., :, 0:1] * b[..., 0:1, :] + a[..., :, 1:2] * b[..., 1:2, :]) + a[..., :, 2:3] * b[..., 2:3, :]
+    product[..., 3] += a[..., 3]
+    return product.reshape(-1, 3, 4)
 
 
 def _masks(mask: ArrayLike, count: int) -> NDArray[np.int64]:

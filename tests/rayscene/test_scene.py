@@ -14,7 +14,7 @@ from renderer.mesh.shapes import box, icosphere
 from renderer.trace.batch import check_rays
 
 pytestmark = pytest.mark.judges(
-    "RayScene", "RayScene.add", "RayScene.all_hits", "RayScene.any_hit", "RayScene.closest_hit",
+    "RayScene", "RayScene.add", "RayScene.add_scene", "RayScene.all_hits", "RayScene.any_hit", "RayScene.closest_hit",
     "RayScene.closest_point", "RayScene.contains", "RayScene.count_hits", "RayScene.count_steps", "RayScene.mesh",
     "RayScene.merged", "RayScene.move", "RayScene.name", "RayScene.objects", "RayScene.refit", "RayScene.remove",
     "RayScene.show", "RayScene.signed_distance", "RayScene.transforms", "RayScene.visible", "RayScene.winding_number",
@@ -262,6 +262,29 @@ def test_a_mesh_that_stands_alone_has_the_hits_of_its_octree():
     np.testing.assert_array_equal(moved.hit, expected.hit)
     scene.show(0, False)
     assert not scene.any_hit(origins, directions).any()
+
+
+def test_a_scene_within_a_scene_stands_at_the_product_of_both_matrices():
+    """Against points that are transformed twice; turned by quarters, so that nothing is rounded."""
+    rng, inner, outer = np.random.default_rng(6), RayScene(), RayScene()
+    own, places = placed(rng, "axes", 3), placed(rng, "axes", 4)
+    inner.add(box(), own, mask=[1, 2, 4])
+    inner.add(icosphere(1), name="ball")
+    inner.show(1, False)
+    outer.add(icosphere(2))
+    assert outer.add_scene(inner, places) == {0: 1, 1: 2} and outer.name(2) == "ball"
+    corners = np.einsum("kij,vj->kvi", own[:, :, :3], box().vertices) + own[:, None, :, 3]
+    corners = np.einsum("kij,nvj->knvi", places[:, :, :3], corners) + places[:, None, None, :, 3]
+    for k, matrix in enumerate(outer.transforms(1)):
+        moved = box().transformed(np.vstack([matrix, [0, 0, 0, 1]])).vertices
+        np.testing.assert_array_equal(moved, corners[k // 3, k % 3])
+    assert_like_merged(outer, 7)
+    target = corners[2, 1].mean(axis=0)
+    masked = outer.closest_hit(target + np.array([0, 0, 0.1]), [0, 0, 1], mask=2)
+    assert masked.object == 1 and masked.instance % 3 == 1
+    with pytest.raises(ValueError, match="matrices that can be inverted"):
+        outer.add_scene(inner, np.zeros((3, 4)))
+    assert outer.objects == [0, 1, 2]
 
 
 def test_hidden_instances_are_hit_by_nothing_and_keep_their_numbers():
