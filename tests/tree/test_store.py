@@ -24,7 +24,7 @@ from renderer import Mesh, Octree
 from renderer.mesh.shapes import icosphere
 from renderer.system import files
 from renderer.trace.layout import BLOCK_WORDS, CACHE_LINE, CHILDREN, NODE_WORDS
-from renderer.tree import store
+from renderer.tree import container, store
 
 pytestmark = pytest.mark.judges("Octree.load", "Octree.save")
 
@@ -123,7 +123,7 @@ def test_a_class_of_ones_own_is_loaded_as_such(path: Path) -> None:
 
 
 def test_the_file_is_as_its_description_says(path: Path) -> None:
-    """Read by ``struct``, ``json`` and ``zlib``, from the text at the head of ``store.py``."""
+    """Read by ``struct``, ``json`` and ``zlib``, from the texts at the heads of ``container.py`` and ``store.py``."""
     saved = Octree.from_mesh(carrying())
     saved.save(path)
     content = path.read_bytes()
@@ -588,7 +588,7 @@ def test_a_file_that_cannot_be_written_stays_as_it_was(
     if failing == "replace":
         monkeypatch.setattr(files.os, "replace", refuse)
     else:
-        monkeypatch.setattr(store, "_zeros_after", refuse)
+        monkeypatch.setattr(container, "_zeros_after", refuse)
     with pytest.raises(OSError, match="No space left on device"):
         SAVED["carrying"]().save(path)
     assert path.read_bytes() == content and os.listdir(path.parent) == [path.name]
