@@ -15,6 +15,7 @@ from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.queryable import Built
 from renderer.rayscene.placing import box_all, corners_of_faces, locate
+from renderer.rayscene.transforms import place_records
 from renderer.system.threads import for_chunks
 from renderer.trace.instances import (
     FIRST_FACE,
@@ -27,7 +28,9 @@ from renderer.trace.instances import (
     MATRIX,
     MESH_FACES,
     MIDDLE,
+    MIRRORS,
     NUMBER_BITS,
+    OBJECT,
     OBJECT_WORDS,
     SCENE_WORDS,
     TOP_NODES,
@@ -51,13 +54,18 @@ _RULE = Rule(SPLITS["midpoint"], 1, 32)
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """A mesh of a scene with its tree, and where its instances are among all."""
+    """A mesh of a scene with its tree, and where its instances are among all; ``names`` are theirs, if any."""
 
     id: int
     name: str
     built: Built
     begin: int
     count: int
+    names: tuple[str, ...] = ()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copy and pickle without the addresses."""
+        return Member, (self.id, self.name, self.built, self.begin, self.count, self.names)
 
     @lazy
     def row(self) -> NDArray[np.int64]:
@@ -83,11 +91,15 @@ class SceneTree:
         words = instances.view(np.int64)
         shown = np.flatnonzero(words[:, FLAGS] & HIDDEN == 0)
         faces = {member.id: len(member.built.mesh.faces) for member in members}
-        filled = np.repeat([faces[m.id] > 0 for m in members], [m.count for m in members])
+        filled = np.repeat(np.array([faces[m.id] > 0 for m in members], np.bool_), [m.count for m in members])
         shown = shown[filled[shown]]
         self.members, self.instances = members, instances
         self.nodes, levels = _top(instances, words, shown, threads)
         self.depth = levels + max((member.built.tree.depth for member in members), default=0) + 1
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copy and pickle without the addresses: instances are placed anew."""
+        return tree_over, (self.members, *placement(self.members, self.instances), 1)
 
     @lazy
     def descriptor(self) -> NDArray[np.uint64]:
@@ -146,6 +158,10 @@ class BuiltScene:
     members: list[Member]
     top: SceneTree
     threads: int
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copy and pickle without what is computed when it is read."""
+        return BuiltScene, (self.members, self.top, self.threads)
 
     @property
     def tree(self) -> Any:
@@ -239,6 +255,29 @@ class BuiltScene:
         return corners
 
 
+def tree_over(
+    members: list[Member], transforms: NDArray[np.float64], flags: NDArray[np.int64], threads: int
+) -> SceneTree:
+    """The tree over the instances of ``members`` that stand at ``transforms``, (n, 3, 4), with ``FLAGS``, (n,).
+
+    Raises ``ValueError`` for what cannot be placed.
+    """
+    check_sizes(members)
+    instances = new_records(len(transforms))
+    instances.view(np.int64)[:, FLAGS] = flags
+    for m in members:
+        own = np.s_[m.begin : m.begin + m.count]
+        place_records(m.row, instances[own], transforms[own])
+    number_faces(members, instances)
+    return SceneTree(members, instances, threads)
+
+
+def placement(members: list[Member], instances: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """The transforms and flags from which ``tree_over`` makes the same records."""
+    transforms = [np.empty((0, 3, 4)), *(matrices_of(m, instances) for m in members)]
+    return np.concatenate(transforms), instances.view(np.int64)[:, FLAGS] & ~MIRRORS
+
+
 def matrices_of(member: Member, instances: NDArray[np.float64]) -> NDArray[np.float64]:
     """The transforms in the records of a member's instances, (k, 3, 4)."""
     own = instances[member.begin : member.begin + member.count, MATRIX : MATRIX + 12].reshape(-1, 3, 4).copy()
@@ -267,4 +306,5 @@ def number_faces(members: list[Member], instances: NDArray[np.float64]) -> None:
         own = words[m.begin : m.begin + m.count]
         faces = len(m.built.mesh.faces)
         own[:, FIRST_FACE] = first + faces * np.arange(m.count)
+        own[:, OBJECT] = m.row.ctypes.data
         first += faces * m.count
