@@ -114,6 +114,7 @@ class RayScene(SceneQueries):
         >>> scene.add(box()), scene.add(box(), transforms=[[1, 0, 0, 2], [0, 1, 0, 0], [0, 0, 1, 0]])
         (0, 1)
         """
+        expect(isinstance(name, str | None), "name", "a string or None", repr(name))
         octree = mesh if isinstance(mesh, Octree) else Octree(as_mesh(mesh, None, False)[0], threads=self.threads)
         built = octree._built
         matrices = as_transforms(transforms)
@@ -284,6 +285,10 @@ class RayScene(SceneQueries):
     def name(self, object: int) -> str:
         """Return the name of an object."""
         return self._member(object).name
+
+    def instance_names(self, object: int) -> tuple[str, ...]:
+        """Return the names of an object's instances, if they have any: those of the nodes of a glTF file."""
+        return self._member(object).names
 
     def mesh(self, object: int) -> Mesh:
         """Return the mesh of an object, to which ``face`` of a hit refers."""

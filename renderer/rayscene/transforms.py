@@ -36,7 +36,9 @@ def as_transforms(transforms: ArrayLike | None) -> Floats:
 def place_records(object_: Ints, records: Floats, matrices: Floats) -> None:
     """Write the records of instances of an object. Raises ``ValueError`` naming one that cannot be placed."""
     bad = _place(object_, records, matrices, 0)
-    expect(bad < 0, "transforms", "matrices that can be inverted", f"{matrices[bad].tolist()} for instance {bad}")
+    if bad >= 0:
+        got = f"{matrices[bad].tolist()} for instance {bad}"
+        expect(False, "transforms", "matrices that can be inverted", got)
 
 
 def can_be_inverted(object_: Ints, matrices: Floats) -> NDArray[np.bool_]:
