@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from dataclasses import replace
 from threading import RLock
 from typing import Any
@@ -26,6 +27,7 @@ from renderer.rayscene.built import (
     new_records,
     number_faces,
 )
+from renderer.rayscene.files import scene_of_files
 from renderer.rayscene.queries import SceneQueries
 from renderer.rayscene.store import StoredScene, load_scene, save_scene
 from renderer.rayscene.transforms import as_transforms, place_records
@@ -396,6 +398,53 @@ class RayScene(SceneQueries):
         """
         threads = checked_threads(threads)
         return cls._of(load_scene(path, flag_argument("mmap", mmap), threads))
+
+    @classmethod
+    def from_files(
+        cls,
+        paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
+        *,
+        threads: int | None = None,
+    ) -> RayScene:
+        """Return the scene in a file, or that of several mesh files.
+
+        Each mesh of a .glb or .gltf file becomes an object, and the nodes and ``EXT_mesh_gpu_instancing`` that show it
+        its instances. A mesh that joints pull, or a matrix flattens, stands as an object of its own.
+        A folder or a list of files becomes a scene with an object for each file, of the file's name.
+
+        Parameters
+        ----------
+        paths : str, path, or iterable of these
+            A mesh file; a folder, whose mesh files are taken in the order of their names; or several of these.
+        threads : int, optional
+            Threads of the builds and of queries; None for all processors.
+
+        Returns
+        -------
+        RayScene
+            ``merged`` has the triangles of ``load_mesh``.
+
+        Raises
+        ------
+        FileNotFoundError
+            If there is no such file. The error is a ``MeshError`` too.
+        MeshError
+            For a file that cannot be read, as by ``load_mesh``; the message names it. Also for a folder without mesh
+            files.
+
+        Notes
+        -----
+        Coordinates stay as they are in the files: in glTF y points up. What is left out is named by a
+        ``RepairWarning``.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> scene = RayScene.from_files(["scenes/models/torus_knot.ply", "scenes/models/stairs.ply"])
+        >>> [scene.name(object) for object in scene.objects]
+        ['torus_knot', 'stairs']
+        """
+        return cls._of(scene_of_files(paths, checked_threads(threads)))
 
     @classmethod
     def _of(cls, stored: StoredScene) -> RayScene:
