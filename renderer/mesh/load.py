@@ -8,7 +8,7 @@ import re
 import warnings
 import zlib
 from codecs import BOM_UTF8
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO, TypeVar
@@ -27,6 +27,7 @@ from renderer.system.files import as_path, read_whole, write_atomically
 
 _GZIP = b"\x1f\x8b"
 T = TypeVar("T")
+FilePaths = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
 
 
 def load_mesh(
@@ -147,12 +148,20 @@ def mesh_suffix(path: Path) -> str | None:
     return found if found in MESH_SUFFIXES else None
 
 
-def mesh_paths(path: str | os.PathLike[str]) -> list[Path]:
-    """The mesh files in a folder, in the order of their names, or the one file at ``path``.
+def mesh_paths(paths: FilePaths) -> list[Path]:
+    """The files at one path or several; those of a folder are its mesh files, in the order of their names.
 
-    A shell's ``*`` finds the same: files whose names begin with a dot, and those of folders below, do not count.
-    Raises ``MeshError`` if there is none.
+    A shell's ``*`` finds the same in a folder: files whose names begin with a dot, and folders, do not count. Raises
+    ``MeshError`` if there is none.
     """
+    one = isinstance(paths, str | bytes | os.PathLike) or not isinstance(paths, Iterable)
+    files = [file for path in ([paths] if one else paths) for file in _files_at(path)]
+    if not files:
+        raise MeshError("paths: expected one file at least, got none")
+    return files
+
+
+def _files_at(path: object) -> list[Path]:
     try:
         found = as_path("path", path)
     except ValueError as error:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from itertools import compress
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import MeshError
-from renderer.mesh.load import load_mesh, load_placed, mesh_paths
+from renderer.mesh.load import FilePaths, load_mesh, load_placed, mesh_paths
 from renderer.mesh.placements import Placed
 from renderer.octree import Octree
 from renderer.queryable import Built
@@ -19,8 +20,6 @@ from renderer.rayscene.built import BuiltScene, Member, tree_over
 from renderer.rayscene.store import StoredScene
 from renderer.rayscene.transforms import as_transforms, can_be_inverted
 from renderer.trace.instances import MASK_BITS
-
-FilePath = str | os.PathLike[str]
 
 
 class _Object(NamedTuple):
@@ -31,7 +30,7 @@ class _Object(NamedTuple):
     names: tuple[str, ...]
 
 
-def scene_of_files(paths: FilePath | Iterable[FilePath], threads: int) -> StoredScene:
+def scene_of_files(paths: FilePaths, threads: int) -> StoredScene:
     """The scene in mesh files, see ``RayScene.from_files``."""
     members: list[Member] = []
     transforms, begin = [np.empty((0, 3, 4))], 0
@@ -47,7 +46,7 @@ def scene_of_files(paths: FilePath | Iterable[FilePath], threads: int) -> Stored
     return StoredScene(BuiltScene(members, tree, threads), len(members))
 
 
-def _objects(paths: FilePath | Iterable[FilePath], threads: int) -> Iterator[_Object]:
+def _objects(paths: FilePaths, threads: int) -> Iterator[_Object]:
     """The objects in mesh files."""
     for path, placed in _placed(paths):
         try:
@@ -57,20 +56,13 @@ def _objects(paths: FilePath | Iterable[FilePath], threads: int) -> Iterator[_Ob
             raise MeshError(f"{path}: {error}") from error
 
 
-def _placed(paths: FilePath | Iterable[FilePath]) -> Iterator[tuple[FilePath, list[Placed]]]:
-    """The meshes of each file: those of the nodes of one that stands alone, or else one."""
-    if isinstance(paths, str | os.PathLike):
-        given = mesh_paths(paths)
-        if not os.path.isdir(paths):
-            yield paths, load_placed(given[0])
-            return
-    elif isinstance(paths, Iterable):
-        given = [file for path in paths for file in mesh_paths(path)]
-        if not given:
-            raise MeshError("paths: expected one mesh file at least, got none")
-    else:
-        raise MeshError(f"paths: expected a path, or a list of paths, got {type(paths).__name__}")
-    for file in given:
+def _placed(paths: FilePaths) -> Iterator[tuple[Path, list[Placed]]]:
+    """The meshes of each file: those of the nodes of a file that is alone, or else one."""
+    files = mesh_paths(paths)
+    if isinstance(paths, str | os.PathLike) and not os.path.isdir(paths):
+        yield files[0], load_placed(files[0])
+        return
+    for file in files:
         yield file, [Placed(load_mesh(file), np.eye(4)[None], ())]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
 from dataclasses import replace
 from threading import RLock
 from typing import Any
@@ -15,6 +14,7 @@ from renderer.arguments.arrays import flag_argument, real_argument
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.mesh.foreign import TriangleMesh
+from renderer.mesh.load import FilePaths
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree, as_mesh
 from renderer.queryable import Queries
@@ -402,7 +402,7 @@ class RayScene(SceneQueries):
     @classmethod
     def from_files(
         cls,
-        paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
+        paths: FilePaths,
         *,
         threads: int | None = None,
     ) -> RayScene:
