@@ -11,8 +11,8 @@ from renderer.errors import expect
 SPLIT = "the rule that cuts cells of the octree (default: midpoint)"
 _SCENE = "a scene file (.toml), or a mesh file (.ply, .obj, .stl, .glb, .gltf), which gets a camera, a sky and a floor"
 _SEVERAL = _SCENE + "; several mesh files, and those of folders, are objects of one scene"
-_UP = "the axis of a mesh file that points up (default: y); a scene file has the key up"
-_WRITE_SCENE = "with a mesh file: write its scene to a new .toml file, which you can change"
+_UP = "the axis of mesh files that points up (default: y); a scene file has the key up"
+_WRITE_SCENE = "with mesh files: write their scene to a new .toml file, which you can change"
 
 
 def add_scene(command: argparse.ArgumentParser, *, shown: bool = True, several: bool = False) -> None:

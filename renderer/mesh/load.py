@@ -11,7 +11,7 @@ from codecs import BOM_UTF8
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import BinaryIO, TypeVar
+from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
 
@@ -154,8 +154,9 @@ def mesh_paths(paths: FilePaths) -> list[Path]:
     A shell's ``*`` finds the same in a folder: files whose names begin with a dot, and folders, do not count. Raises
     ``MeshError`` if there is none.
     """
-    one = isinstance(paths, str | bytes | os.PathLike) or not isinstance(paths, Iterable)
-    files = [file for path in ([paths] if one else paths) for file in _files_at(path)]
+    given: Any = paths
+    one = isinstance(given, str | bytes | os.PathLike) or not isinstance(given, Iterable)
+    files = [file for path in ([given] if one else given) for file in _files_at(path)]
     if not files:
         raise MeshError("paths: expected one file at least, got none")
     return files

@@ -289,7 +289,16 @@ class RayScene(SceneQueries):
         return self._member(object).name
 
     def instance_names(self, object: int) -> tuple[str, ...]:
-        """Return the names of an object's instances, if they have any: those of the nodes of a glTF file."""
+        """Return the names of an object's instances: those of the nodes of a glTF file, or none.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> scene.instance_names(scene.add(box()))
+        ()
+        """
         return self._member(object).names
 
     def mesh(self, object: int) -> Mesh:
