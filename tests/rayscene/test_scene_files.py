@@ -154,6 +154,18 @@ def test_a_mesh_keeps_colours_that_others_have_not(tmp_path: Path) -> None:
         load_mesh(tmp_path / "a.glb")
 
 
+@pytest.mark.filterwarnings("ignore:.*points and lines")
+def test_nodes_that_show_no_triangle_are_no_objects(tmp_path: Path) -> None:
+    glb = Glb()
+    meshes = shapes(glb) + shapes(glb)
+    meshes[1]["primitives"][0]["mode"] = 1
+    rows = {"TRANSLATION": glb.add(TRIANGLE, "f", 5126, "VEC3", 0)}
+    glb.accessors[-1]["count"] = 0
+    nowhere = {"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {"attributes": rows}}}
+    found = objects(tmp_path / "a.glb", glb.file(meshes=meshes, nodes=[nowhere, {"mesh": 1}, {"mesh": 0, "name": "n"}]))
+    assert found == [("n", ("n",), 1)]
+
+
 def test_what_is_left_out_is_named_with_the_file(tmp_path: Path) -> None:
     glb = Glb()
     meshes = shapes(glb)
