@@ -158,7 +158,7 @@ def mesh_paths(paths: FilePaths) -> list[Path]:
     one = isinstance(given, str | bytes | os.PathLike) or not isinstance(given, Iterable)
     files = [file for path in ([given] if one else given) for file in _files_at(path)]
     if not files:
-        raise MeshError("paths: expected one file at least, got none")
+        raise MeshError("path: expected a string or path, got none of several")
     return files
 
 
@@ -167,9 +167,12 @@ def _files_at(path: object) -> list[Path]:
         found = as_path("path", path)
     except ValueError as error:
         raise MeshError(str(error)) from None
-    if not found.is_dir():
+    if not os.path.isdir(found):  # which no name is too long for
         return [found]
-    inside = sorted(each for each in found.iterdir() if not each.name.startswith("."))
+    try:
+        inside = sorted(each for each in found.iterdir() if not each.name.startswith("."))
+    except OSError as error:
+        raise MeshError(f"{found}: cannot be read: {error.strerror or error}") from error
     files = [each for each in inside if mesh_suffix(each) is not None and not each.is_dir()]
     if not files:
         raise MeshError(f"{found}: expected mesh files ({', '.join(MESH_SUFFIXES)}) in the folder, got none")

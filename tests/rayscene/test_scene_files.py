@@ -223,7 +223,7 @@ def test_a_folder_has_an_object_for_each_mesh_file(folder: Path) -> None:
         ("huge.glb", r"huge\.glb: transforms: expected coordinates up to 1\.15e\+18, "),
         ("lines.glb", r"lines\.glb: holds no good faces: left out, as they have no surface: points and lines"),
         ("none.glb", r"none\.glb: holds no faces"),
-        ([], r"paths: expected one file at least, got none"),
+        ([], r"path: expected a string or path, got none of several"),
         (3, r"path: expected a string or path, got int"),
         ([3], r"path: expected a string or path, got int"),
         (b"a.ply", r"path: expected a string or path, got bytes"),
