@@ -26,8 +26,8 @@ _ACCELERATOR = "default: auto, the octree unless there are very few faces; brute
 
 def add_render(commands: Any) -> None:
     """Add the command to a parser's ``commands``."""
-    render = commands.add_parser("render", help="render a scene file to a picture")
-    add_scene(render)
+    render = commands.add_parser("render", help="render a scene file or meshes to a picture")
+    add_scene(render, several=True)
     formats = ".png, or .exr or .npy for linear radiance"
     render.add_argument("-o", "--output", type=Path, default=Path("out.png"), help=formats)
     render.add_argument(
@@ -97,18 +97,19 @@ def _render(options: argparse.Namespace) -> None:
 def _scene(options: argparse.Namespace) -> Any:
     """The scene that is rendered, with the changes of the options."""
     from renderer.scene.change import changed
-    from renderer.scene.scene import load_scene
+    from renderer.scene.scene import load_scene, scene_files
 
-    scene = load_scene(options.scene, up=options.up)
-    _check_output_is_no_input(options, scene)  # nor one of an object that a change hides
+    files = scene_files(options.scene)
+    scene = load_scene(files, up=options.up)
+    _check_output_is_no_input(options, files, scene)  # nor one of an object that a change hides
     for text in options.change:
         try:
             scene = changed(scene, text)
         except ValueError as error:
             raise ValueError(f"--change: {error}") from None
-    write_scene_of(options)
+    write_scene_of(files, options)
     if not options.quiet:
-        say_up(options.scene, options.up)
+        say_up(files, options.up)
     return scene
 
 
@@ -165,11 +166,11 @@ def _summary(image: Any, options: argparse.Namespace) -> str:
     return f"{options.output}: {width} x {height}, {rays} rays in {image.render_seconds:.2f} s {speed}"
 
 
-def _check_output_is_no_input(options: argparse.Namespace, scene: Any) -> None:
+def _check_output_is_no_input(options: argparse.Namespace, files: list[Path], scene: Any) -> None:
     """Refuse to write the picture over one of its inputs, also through links."""
     from renderer.system.files import are_apart
 
-    read = [options.scene, *(thing.mesh for thing in scene.objects if isinstance(thing.mesh, Path))]
+    read = [*files, *(thing.mesh for thing in scene.objects if isinstance(thing.mesh, Path))]
     written = [options.write_scene] if options.write_scene else []
     apart, output = are_apart([options.output], [*read, *written]), os.path.realpath(options.output)
     expect(apart, "--output", "another file than the scene's own", f"{output} by a link")

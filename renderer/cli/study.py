@@ -16,7 +16,10 @@ SPLIT: Literal["sah"] = "sah"
 _KINDS = {"sky": "sky view factor", "sun": "hours of sun", "ao": "ambient occlusion"}
 # Options that one kind alone has, which are its function's.
 _OWN = {"sky": ("patches", "definition"), "sun": ("suns",), "ao": ("samples",)}
-_MESH = "mesh files (.ply, .obj, .stl, .glb, .gltf); several are one mesh, and the summary has the values of each"
+_MESH = (
+    "mesh files (.ply, .obj, .stl, .glb, .gltf), or folders of them; several are one mesh, and the summary has the "
+    "values of each"
+)
 _UP = "the axis that points up; default: y for glTF, else z. kind sun: with it, suns below the horizon do not count"
 _HIDE = "leave out the mesh files of this name or pattern, such as 'tree*.obj'; may be given again"
 _VERTICES = "a value for each vertex: the mean of its faces' values, weighted by their areas"
@@ -77,9 +80,11 @@ def _study(options: argparse.Namespace) -> None:
     import time
 
     from renderer.checkpoints.study import Study
+    from renderer.mesh.load import mesh_paths
     from renderer.octree import Octree
 
     _check_options(options)
+    options.mesh = mesh_paths(options.mesh)
     _check_output(options)
     paths = kept_of(options.mesh, options.hide)
     up = _up(paths, options)

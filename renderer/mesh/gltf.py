@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple, TypeGuard
+from typing import Any, NamedTuple, TypeGuard, TypeVar
 from urllib.parse import unquote
 
 import numpy as np
@@ -20,11 +20,12 @@ from renderer.errors import MeshError
 from renderer.mesh.accessors import Accessors
 from renderer.mesh.mesh import Mesh, give_parts
 from renderer.mesh.parts import parts_of
-from renderer.mesh.placements import Nodes
+from renderer.mesh.placements import Nodes, Placed
 from renderer.mesh.reading import Reading
 from renderer.system.files import read_whole
 
 Floats = NDArray[np.float64]
+T = TypeVar("T")
 
 _JSON, _BINARY = b"JSON", b"BIN\0"
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
@@ -43,6 +44,28 @@ _HARMLESS = (
 _LEFT_OUT = ("materials", "textures", "animations", "cameras")
 
 
+class _Shown(NamedTuple):
+    """What a node shows: the meshes of primitives, and where each of them stands.
+
+    name      of the node, or else of its mesh
+    of_mesh   the name of the mesh
+    key       nodes of one key show the same meshes
+    matrices  None where the meshes stand in the world already
+    """
+
+    name: str
+    of_mesh: str
+    key: tuple[Any, ...]
+    meshes: list[Mesh]
+    matrices: list[Floats] | None
+
+    def placed(self) -> list[Mesh]:
+        """The meshes in the world."""
+        if self.matrices is None:
+            return self.meshes
+        return [mesh.transformed(matrix) for mesh in self.meshes for matrix in self.matrices]
+
+
 class _Corners(NamedTuple):
     """The corners of a primitive: positions, and what else its file gives each."""
 
@@ -50,8 +73,11 @@ class _Corners(NamedTuple):
     faces: NDArray[np.int64]
     attributes: dict[str, Any]
 
+    def mesh(self, reading: Reading) -> Mesh:
+        return reading.mesh(self.positions, self.faces, **self.attributes)
 
-def parse_gltf(content: bytes, reading: Reading | None = None, folder: Path | None = None) -> Mesh:
+
+def parse_gltf(content: bytes, reading: Reading, folder: Path | None = None) -> Mesh:
     """All triangle meshes in a file's content, each where its nodes, instances and joints place it.
 
     Skins stand as the file's nodes are, morph targets by the file's weights. Nodes with meshes are parts. Buffers in
@@ -59,19 +85,36 @@ def parse_gltf(content: bytes, reading: Reading | None = None, folder: Path | No
 
     Raises ``MeshError``, which does not know the file's name.
     """
-    reading = reading or Reading()
+    return _parsed(content, reading, folder, _merged)
+
+
+def placed_gltf(content: bytes, reading: Reading, folder: Path | None = None) -> list[Placed]:
+    """The same meshes, each once, with the matrices of the nodes and instances that show it.
+
+    A mesh that joints pull is placed. A mesh has the name of its node, or that of the file's mesh if several show it.
+    """
+    return _parsed(content, reading, folder, _apart)
+
+
+def _parsed(content: bytes, reading: Reading, folder: Path | None, made: Callable[[list[_Shown], Reading], T]) -> T:
+    """What is made of that which the nodes in a file's content show."""
     document, binary = _document(content)
     try:
         _refuse_unread(document)
         accessors = Accessors(document, _buffers(document, binary, folder))
         with np.errstate(over="ignore", invalid="ignore"):  # what float64 cannot hold is rejected or repaired
-            return _mesh(document, accessors, reading)
+            shown = list(_shown(document, accessors, reading))
+            found = made(shown, reading)
+        left_out = [key for key in _LEFT_OUT if document.get(key)]
+        if left_out and any(node.meshes for node in shown):
+            reading.note("left out:", left_out)
     except MeshError:
         raise
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError) as error:
         # Each entry of a malformed document may be of any type, or missing.
         fault = " ".join(str(error).split())[:120]
         raise MeshError(f"malformed glTF: {type(error).__name__}: {fault}") from error
+    return found
 
 
 def buffer_names(content: bytes) -> list[str]:
@@ -147,41 +190,71 @@ def _buffer(number: int, buffer: dict[str, Any], binary: bytes | None, folder: P
         raise MeshError(f"glTF: buffer {number}, {uri[:80]!r}: cannot be read: {error.strerror}") from error
 
 
-def _mesh(document: dict[str, Any], accessors: Accessors, reading: Reading) -> Mesh:
+def _shown(document: dict[str, Any], accessors: Accessors, reading: Reading) -> Iterator[_Shown]:
+    """What each node with a mesh shows, in their order."""
     nodes = Nodes(document, accessors)
-    meshes: list[Mesh] = []
-    names, counts = [], []
+    known: dict[tuple[Any, ...], list[Mesh]] = {}
     for number, node in nodes.with_meshes():
         mesh = document["meshes"][node["mesh"]]
         weights = node.get("weights") or mesh.get("weights") or []
-        first = len(meshes)
-        for primitive in mesh["primitives"]:
-            meshes += _placed(primitive, weights, number, nodes, accessors, reading)
-        names.append(str(node.get("name") or mesh.get("name") or ""))
-        counts.append(sum(len(one.faces) for one in meshes[first:]))
+        of_mesh = str(mesh.get("name") or "")
+        joined = any(nodes.have_joints(number, primitive["attributes"]) for primitive in mesh["primitives"])
+        key = ("joints", number) if joined else (node["mesh"], *weights)
+        if key not in known:
+            cornered = ((each, _corners(each, weights, accessors, reading)) for each in mesh["primitives"])
+            primitives = [(each["attributes"], corners) for each, corners in cornered if corners is not None]
+            known[key] = (
+                list(_pulled(primitives, number, nodes, reading))
+                if joined
+                else [corners.mesh(reading) for _, corners in primitives]
+            )
+        matrices = None if joined else nodes.matrices(number)
+        yield _Shown(str(node.get("name") or of_mesh), of_mesh, key, known[key], matrices)
+
+
+def _pulled(
+    primitives: list[tuple[dict[str, int], _Corners]], number: int, nodes: Nodes, reading: Reading
+) -> Iterator[Mesh]:
+    """The meshes in the world of a node's primitives, of which joints pull one at least."""
+    for attributes, corners in primitives:
+        if nodes.have_joints(number, attributes):
+            yield _skinned(corners, nodes.joints(number, attributes)).mesh(reading)
+        else:
+            mesh = corners.mesh(reading)
+            yield from (mesh.transformed(matrix) for matrix in nodes.matrices(number))
+
+
+def _merged(shown: list[_Shown], reading: Reading) -> Mesh:
+    """One mesh, of which each node is a part."""
+    placed = [node.placed() for node in shown]
+    counts = [sum(len(mesh.faces) for mesh in meshes) for meshes in placed]
+    names = [node.name for node in shown]
+    return give_parts(_joined([mesh for meshes in placed for mesh in meshes], reading), parts_of(names, counts))
+
+
+def _apart(shown: list[_Shown], reading: Reading) -> list[Placed]:
+    """A mesh for each key."""
+    of_key: dict[tuple[Any, ...], list[_Shown]] = {}
+    for node in shown:
+        if node.meshes and node.matrices != []:
+            of_key.setdefault(node.key, []).append(node)
+    found = []
+    for nodes in of_key.values():
+        first = nodes[0]
+        name = first.name if len(nodes) == 1 else first.of_mesh or first.name
+        matrices = [[np.eye(4)] if node.matrices is None else node.matrices for node in nodes]
+        names = [node.name for node, own in zip(nodes, matrices, strict=True) for _ in own]
+        found.append(Placed(_joined(first.meshes, reading, name), np.concatenate(matrices), tuple(names)))
+    return found
+
+
+def _joined(meshes: list[Mesh], reading: Reading, name: str = "") -> Mesh:
+    """One mesh without parts."""
     for attribute in ("normals", "colors", "texcoords"):
-        having = [getattr(one, attribute) is not None for one in meshes]
+        having = [getattr(mesh, attribute) is not None for mesh in meshes]
         if any(having) and not all(having):
             reading.note(f"left out, as only some primitives have them: {attribute}")
-    left_out = [key for key in _LEFT_OUT if document.get(key)]
-    if left_out and meshes:
-        reading.note("left out:", left_out)
-    return give_parts(Mesh.concatenate(meshes), parts_of(names, counts))
-
-
-def _placed(
-    primitive: dict[str, Any], weights: list[float], number: int, nodes: Nodes, accessors: Accessors, reading: Reading
-) -> Iterator[Mesh]:
-    """The meshes of a primitive, one for each instance of its node."""
-    corners = _corners(primitive, weights, accessors, reading)
-    if corners is None:
-        return
-    for matrix in nodes.matrices(number, primitive["attributes"]):
-        if matrix.ndim == 3:
-            moved = _skinned(corners, matrix)
-            yield reading.mesh(moved.positions, moved.faces, **moved.attributes)
-        else:
-            yield reading.mesh(corners.positions, corners.faces, **corners.attributes).transformed(matrix)
+    return give_parts(Mesh.concatenate(meshes, name=name), ())
 
 
 def _corners(

@@ -8,21 +8,26 @@ import re
 import warnings
 import zlib
 from codecs import BOM_UTF8
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO, TypeVar
+
+import numpy as np
 
 from renderer.errors import MeshError, NoSuchMeshError
-from renderer.mesh.gltf import buffer_names, parse_gltf
+from renderer.mesh.gltf import buffer_names, parse_gltf, placed_gltf
 from renderer.mesh.mesh import Mesh, RepairWarning
 from renderer.mesh.obj import parse_obj
+from renderer.mesh.placements import Placed
 from renderer.mesh.ply import format_ply, parse_ply
 from renderer.mesh.reading import Reading
 from renderer.mesh.stl import parse_stl
 from renderer.system.files import as_path, read_whole, write_atomically
 
 _GZIP = b"\x1f\x8b"
+T = TypeVar("T")
+FilePaths = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
 
 
 def load_mesh(
@@ -79,19 +84,34 @@ def load_mesh(
     for argument, value in (("repair", repair), ("strict", strict)):
         if not isinstance(value, bool):
             raise MeshError(f"{argument}: expected True or False, got {value!r}")
+    mesh, stem = _loaded(path, parse_mesh, Reading(repair), strict)
+    return replace(mesh, name=stem if name is None else name)
+
+
+def load_placed(path: str | os.PathLike[str]) -> list[Placed]:
+    """The meshes in a file, each once, and where they stand: those of a glTF file's nodes, or the one of another file.
+
+    ``Mesh.transformed`` places the triangles of ``load_mesh`` so. Raises ``MeshError`` and warns as that does.
+    """
+    placed, stem = _loaded(path, _parse_placed, Reading(), strict=False)
+    return [each._replace(mesh=replace(each.mesh, name=each.mesh.name or stem)) for each in placed]
+
+
+def _loaded(
+    path: str | os.PathLike[str] | bytes | BinaryIO, parse: Callable[..., T], reading: Reading, strict: bool
+) -> tuple[T, str]:
+    """What is parsed of a file, and the file's name without its suffix. Warns of what was left out."""
     shown, suffix, content, folder = _read(path)
-    reading = Reading(repair)
     try:
-        mesh = parse_mesh(content, suffix, reading, folder)
+        parsed = parse(content, suffix, reading, folder)
     except MeshError as error:
         raise MeshError(f"{shown}: {error}") from error
     said = reading.said
     if said and strict:
         raise MeshError(f"{shown}: {said}")
     if said:
-        warnings.warn(f"{shown}: {said}", RepairWarning, stacklevel=2)
-    stem = "" if folder is None else Path(str(shown).removesuffix(".gz")).stem
-    return replace(mesh, name=stem if name is None else name)
+        warnings.warn(f"{shown}: {said}", RepairWarning, stacklevel=3)
+    return parsed, "" if folder is None else Path(str(shown).removesuffix(".gz")).stem
 
 
 def _read(path: str | os.PathLike[str] | bytes | BinaryIO) -> tuple[object, str, bytes, Path | None]:
@@ -126,6 +146,37 @@ def mesh_suffix(path: Path) -> str | None:
     last = path.suffix.lower()
     found = Path(path.stem).suffix.lower() if last == ".gz" else last
     return found if found in MESH_SUFFIXES else None
+
+
+def mesh_paths(paths: FilePaths) -> list[Path]:
+    """The files at one path or several; those of a folder are its mesh files, in the order of their names.
+
+    A shell's ``*`` finds the same in a folder: files whose names begin with a dot, and folders, do not count. Raises
+    ``MeshError`` if there is none.
+    """
+    given: Any = paths
+    one = isinstance(given, str | bytes | os.PathLike) or not isinstance(given, Iterable)
+    files = [file for path in ([given] if one else given) for file in _files_at(path)]
+    if not files:
+        raise MeshError("path: expected a string or path, got none of several")
+    return files
+
+
+def _files_at(path: object) -> list[Path]:
+    try:
+        found = as_path("path", path)
+    except ValueError as error:
+        raise MeshError(str(error)) from None
+    if not os.path.isdir(found):  # which no name is too long for
+        return [found]
+    try:
+        inside = sorted(each for each in found.iterdir() if not each.name.startswith("."))
+    except OSError as error:
+        raise MeshError(f"{found}: cannot be read: {error.strerror or error}") from error
+    files = [each for each in inside if mesh_suffix(each) is not None and not each.is_dir()]
+    if not files:
+        raise MeshError(f"{found}: expected mesh files ({', '.join(MESH_SUFFIXES)}) in the folder, got none")
+    return files
 
 
 def buffer_files(path: Path) -> list[Path]:
@@ -167,14 +218,30 @@ def parse_mesh(content: bytes, suffix: str, reading: Reading | None = None, fold
 
     Raises ``MeshError`` as ``load_mesh`` does, without the file's name.
     """
-    reading = reading or Reading()
-    # Some editors begin a text with a byte order mark, which is no part of it. In STL only its length tells what it is.
-    if suffix != ".stl":
-        content = content.removeprefix(BOM_UTF8)
+    reading, content = reading or Reading(), _unmarked(content, suffix)
     mesh = parse_gltf(content, reading, folder) if suffix in Y_UP else _PARSERS[suffix](content, reading)
-    if len(mesh.faces) == 0:
-        raise MeshError(f"holds no good faces: {reading.said}" if reading.said else "holds no faces")
+    _expect_faces(len(mesh.faces), reading)
     return mesh
+
+
+def _parse_placed(content: bytes, suffix: str, reading: Reading, folder: Path | None) -> list[Placed]:
+    """The meshes in a file's content, see ``load_placed``."""
+    if suffix not in Y_UP:
+        return [Placed(parse_mesh(content, suffix, reading, folder), np.eye(4)[None], ())]
+    placed = placed_gltf(_unmarked(content, suffix), reading, folder)
+    _expect_faces(sum(len(each.mesh.faces) for each in placed), reading)
+    return placed
+
+
+def _unmarked(content: bytes, suffix: str) -> bytes:
+    """The content without the byte order mark with which some editors begin a text, and which is no part of it."""
+    # In STL only its length tells what it is.
+    return content if suffix == ".stl" else content.removeprefix(BOM_UTF8)
+
+
+def _expect_faces(count: int, reading: Reading) -> None:
+    if count == 0:
+        raise MeshError(f"holds no good faces: {reading.said}" if reading.said else "holds no faces")
 
 
 def save_ply(mesh: Mesh, path: str | os.PathLike[str]) -> None:

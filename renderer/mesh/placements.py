@@ -1,19 +1,28 @@
-"""Where a glTF document's nodes stand: their matrices, those of their instances, and those of the joints of skins."""
+"""Where meshes of a file stand: the matrices of a glTF document's nodes, of their instances and of joints of skins."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import MeshError
 from renderer.mesh.accessors import Accessors
+from renderer.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
 
 _INSTANCING = "EXT_mesh_gpu_instancing"
+
+
+class Placed(NamedTuple):
+    """A mesh of a file, and where it stands: the matrices of its instances, (k, 4, 4), and their names, k or none."""
+
+    mesh: Mesh
+    matrices: Floats
+    names: tuple[str, ...]
 
 
 class Nodes:
@@ -32,17 +41,20 @@ class Nodes:
             if "mesh" in self._nodes[number]:
                 yield number, self._nodes[number]
 
-    def matrices(self, number: int, attributes: dict[str, int]) -> Iterator[Floats]:
-        """Where the mesh of a node is: a matrix for each instance, or, with a skin, one for each vertex, (V, 4, 4)."""
-        node = self._nodes[number]
-        instances = (node.get("extensions") or {}).get(_INSTANCING)
-        if node.get("skin") is not None and "JOINTS_0" in attributes:
-            yield self._skin(self._document["skins"][node["skin"]], attributes)
-        elif instances:
-            for own in self._instances(instances["attributes"]):
-                yield self._world[number] @ own
-        else:
-            yield self._world[number]
+    def matrices(self, number: int) -> list[Floats]:
+        """Where the mesh of a node is: a matrix for each instance."""
+        instances = (self._nodes[number].get("extensions") or {}).get(_INSTANCING)
+        if not instances:
+            return [self._world[number]]
+        return [self._world[number] @ own for own in self._instances(instances["attributes"])]
+
+    def have_joints(self, number: int, attributes: dict[str, int]) -> bool:
+        """Whether joints pull the vertices of a primitive of a node, in place of its matrices."""
+        return self._nodes[number].get("skin") is not None and "JOINTS_0" in attributes
+
+    def joints(self, number: int, attributes: dict[str, int]) -> Floats:
+        """The matrix by which joints pull each of those vertices, (V, 4, 4)."""
+        return self._skin(self._document["skins"][self._nodes[number]["skin"]], attributes)
 
     def _roots(self) -> list[int]:
         scenes = self._document.get("scenes") or []

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from copy import copy
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -16,6 +15,7 @@ from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.queryable import Built
 from renderer.rayscene.placing import box_all, corners_of_faces, locate
+from renderer.rayscene.transforms import place_records
 from renderer.system.threads import for_chunks
 from renderer.trace.batch import NO_STARTS, RayBatch
 from renderer.trace.instances import (
@@ -31,6 +31,7 @@ from renderer.trace.instances import (
     MATRIX,
     MESH_FACES,
     MIDDLE,
+    MIRRORS,
     NUMBER_BITS,
     OBJECT,
     OBJECT_WORDS,
@@ -55,13 +56,18 @@ _RULE = Rule(SPLITS["midpoint"], 1, 32)
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """A mesh of a scene with its tree, and where its instances are among all."""
+    """A mesh of a scene with its tree, and where its instances are among all; ``names`` are theirs, if any."""
 
     id: int
     name: str
     built: Built
     begin: int
     count: int
+    names: tuple[str, ...] = ()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copy and pickle without the addresses."""
+        return Member, (self.id, self.name, self.built, self.begin, self.count, self.names)
 
     @lazy
     def row(self) -> NDArray[np.int64]:
@@ -87,9 +93,7 @@ class SceneTree:
         words = instances.view(np.int64)
         shown = np.flatnonzero(words[:, FLAGS] & HIDDEN == 0)
         faces = {member.id: len(member.built.mesh.faces) for member in members}
-        filled = np.repeat(
-            np.array([faces[m.id] > 0 for m in members], np.bool_), np.array([m.count for m in members], np.int64)
-        )
+        filled = np.repeat(np.array([faces[m.id] > 0 for m in members], np.bool_), [m.count for m in members])
         shown = shown[filled[shown]]
         self.members, self.instances = members, instances
         self.nodes, levels = _top(instances, words, shown, threads)
@@ -100,10 +104,14 @@ class SceneTree:
         expect_known("faces", faces, SIDES)
         if faces == SIDES[0]:
             return self
-        tree = copy(self)
-        tree.descriptor = self.descriptor.copy()
+        tree = SceneTree.__new__(SceneTree)
+        vars(tree).update(vars(self), descriptor=self.descriptor.copy())
         tree.descriptor[FACING] = SIDES.index(faces)
         return tree
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copy and pickle without the addresses: instances are placed anew."""
+        return tree_over, (self.members, *placement(self.members, self.instances), 1)
 
     @lazy
     def descriptor(self) -> NDArray[np.uint64]:
@@ -158,6 +166,10 @@ class BuiltScene:
     members: list[Member]
     top: SceneTree
     threads: int
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copy and pickle without what is computed when it is read."""
+        return BuiltScene, (self.members, self.top, self.threads)
 
     @property
     def tree(self) -> Any:
@@ -267,6 +279,29 @@ class BuiltScene:
         corners = np.empty((len(faces), 3, 3))
         corners_of_faces(self.top.descriptor, np.ascontiguousarray(faces), corners)
         return corners
+
+
+def tree_over(
+    members: list[Member], transforms: NDArray[np.float64], flags: NDArray[np.int64], threads: int
+) -> SceneTree:
+    """The tree over the instances of ``members`` that stand at ``transforms``, (n, 3, 4), with ``FLAGS``, (n,).
+
+    Raises ``ValueError`` for what cannot be placed.
+    """
+    check_sizes(members)
+    instances = new_records(len(transforms))
+    instances.view(np.int64)[:, FLAGS] = flags
+    for m in members:
+        own = np.s_[m.begin : m.begin + m.count]
+        place_records(m.row, instances[own], transforms[own])
+    number_faces(members, instances)
+    return SceneTree(members, instances, threads)
+
+
+def placement(members: list[Member], instances: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """The transforms and flags from which ``tree_over`` makes the same records."""
+    transforms = [np.empty((0, 3, 4)), *(matrices_of(m, instances) for m in members)]
+    return np.concatenate(transforms), instances.view(np.int64)[:, FLAGS] & ~MIRRORS
 
 
 def matrices_of(member: Member, instances: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -5,14 +5,16 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from threading import RLock
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.arguments.arrays import real_argument
+from renderer.arguments.arrays import flag_argument, real_argument
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.mesh.foreign import TriangleMesh
+from renderer.mesh.load import FilePaths
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree, as_mesh
 from renderer.queryable import Built, Queries
@@ -25,12 +27,15 @@ from renderer.rayscene.built import (
     new_records,
     number_faces,
 )
-from renderer.rayscene.placing import LARGEST, place
+from renderer.rayscene.files import scene_of_files
 from renderer.rayscene.queries import SceneQueries
+from renderer.rayscene.store import StoredScene, load_scene, save_scene
+from renderer.rayscene.transforms import as_transforms, place_records
 from renderer.system.threads import checked_threads
-from renderer.trace.instances import FLAGS, HIDDEN, MASK_BITS, OBJECT
+from renderer.trace.instances import FLAGS, HIDDEN, MASK_BITS
 
-_IDENTITY = np.eye(4)[:3]
+# What a copy of a scene has of its own.
+_OWN = ("_lock", "_members", "_instances", "_snapshot", "_next")
 
 
 class RayScene(SceneQueries):
@@ -111,8 +116,9 @@ class RayScene(SceneQueries):
         >>> scene.add(box()), scene.add(box(), transforms=[[1, 0, 0, 2], [0, 1, 0, 0], [0, 0, 1, 0]])
         (0, 1)
         """
+        expect(isinstance(name, str | None), "name", "a string or None", repr(name))
         octree = mesh if isinstance(mesh, Octree) else Octree(as_mesh(mesh, None, False)[0], threads=self.threads)
-        matrices = _matrices(transforms)
+        matrices = as_transforms(transforms)
         name = octree.mesh.name if name is None else name
         return self._add(octree._built, name, matrices, _masks(mask, len(matrices)))
 
@@ -149,7 +155,7 @@ class RayScene(SceneQueries):
         >>> town.closest_hit([5.5, 0.25, 9], [0, 0, -1]).instance
         array(5)
         """
-        outer, there = _matrices(transforms), scene._built
+        outer, there = as_transforms(transforms), scene._built
         with self._lock:
             before = self._members, self._instances, self._snapshot, self._next
             try:
@@ -170,7 +176,7 @@ class RayScene(SceneQueries):
             check_sizes(members)
             own = new_records(len(matrices))
             own.view(np.int64)[:, FLAGS] = flags
-            _place(member, own, matrices)
+            place_records(member.row, own, matrices)
             self._change(members, np.concatenate([self._instances, own]))
             self._next += 1
             return member.id
@@ -201,13 +207,13 @@ class RayScene(SceneQueries):
         >>> scene.closest_hit([0.5, 0.25, 9], [0, 0, -1]).t
         array(3.)
         """
-        matrices = _matrices(transforms)
+        matrices = as_transforms(transforms)
         with self._lock:
             member = self._member(object)
             rows = _rows(instances, member.count)
             expect(len(matrices) == len(rows), "transforms", f"{len(rows)} matrices", f"{len(matrices)}")
             own = self._instances[member.begin + rows]
-            _place(member, own, matrices)
+            place_records(member.row, own, matrices)
             changed = self._writable()
             changed[member.begin + rows] = own
             self._change(self._members, changed)
@@ -242,7 +248,7 @@ class RayScene(SceneQueries):
             octree.refit(vertices)
             refitted = replace(member, built=octree._built)
             own = self._instances[member.begin : member.begin + member.count].copy()
-            _place(refitted, own, matrices_of(member, self._instances))
+            place_records(refitted.row, own, matrices_of(member, self._instances))
             changed = self._writable()
             changed[member.begin : member.begin + member.count] = own
             self._change([refitted if m.id == object else m for m in self._members], changed)
@@ -331,6 +337,19 @@ class RayScene(SceneQueries):
         """Return the name of an object."""
         return self._member(object).name
 
+    def instance_names(self, object: int) -> tuple[str, ...]:
+        """Return the names of an object's instances: those of the nodes of a glTF file, or none.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> scene.instance_names(scene.add(box()))
+        ()
+        """
+        return self._member(object).names
+
     def mesh(self, object: int) -> Mesh:
         """Return the mesh of an object, to which ``face`` of a hit refers."""
         return self._member(object).built.mesh
@@ -354,6 +373,160 @@ class RayScene(SceneQueries):
         (24, [4.0, 1.0, 1.0])
         """
         return self._built.merged.mesh
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the scene to one file for ``RayScene.load``, with the mesh and tree of each octree once.
+
+        The file appears whole or not at all.
+
+        Parameters
+        ----------
+        path : str or path
+            Any file name.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written.
+        ValueError
+            For what is no path.
+
+        Notes
+        -----
+        ``renderer/rayscene/store.py`` describes the file.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box(), transforms=[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 5]])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     scene.save(f"{folder}/cube.scene")
+        ...     again = RayScene.load(f"{folder}/cube.scene")
+        >>> again.closest_hit([0.5, 0.25, 9], [0, 0, -1]).t
+        array(3.)
+        """
+        with self._lock:
+            stored = StoredScene(self._built, self._next)
+        save_scene(path, stored)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], *, mmap: bool = False, threads: int | None = None) -> RayScene:
+        """Return the scene that ``RayScene.save`` wrote.
+
+        It gives the same bits, and can be changed, pickled and saved again.
+
+        Parameters
+        ----------
+        path : str or path
+        mmap : bool, default False
+            Map the meshes and trees instead of reading them, as ``Octree.load`` does.
+        threads : int, optional
+            Threads of queries; None for all processors.
+
+        Returns
+        -------
+        RayScene
+
+        Raises
+        ------
+        FileNotFoundError
+            If there is no such file. The error is a ``ValueError`` too.
+        ValueError
+            For a file that is no scene, of another version, truncated or damaged. The message names the path.
+
+        Notes
+        -----
+        No content, damaged or forged, crashes a query. Where no checksum is checked, it may give wrong hits.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box(), name="cube")
+        >>> with tempfile.NamedTemporaryFile() as file:
+        ...     scene.save(file.name)
+        ...     mapped = RayScene.load(file.name, mmap=True, threads=1)
+        >>> mapped.name(cube), mapped.closest_hit([0.5, 0.25, 9], [0, 0, -1]).t
+        ('cube', array(8.))
+        """
+        threads = checked_threads(threads)
+        return cls._of(load_scene(path, flag_argument("mmap", mmap), threads))
+
+    @classmethod
+    def from_files(
+        cls,
+        paths: FilePaths,
+        *,
+        threads: int | None = None,
+    ) -> RayScene:
+        """Return the scene in a file, or that of several mesh files.
+
+        Each mesh of a .glb or .gltf file becomes an object, and the nodes and ``EXT_mesh_gpu_instancing`` that show it
+        its instances. A mesh that joints pull, or a matrix flattens, stands as an object of its own.
+        A folder or a list of files becomes a scene with an object for each file, of the file's name.
+
+        Parameters
+        ----------
+        paths : str, path, or iterable of these
+            A mesh file; a folder, whose mesh files are taken in the order of their names; or several of these.
+        threads : int, optional
+            Threads of the builds and of queries; None for all processors.
+
+        Returns
+        -------
+        RayScene
+            ``merged`` has the triangles of ``load_mesh``.
+
+        Raises
+        ------
+        FileNotFoundError
+            If there is no such file. The error is a ``MeshError`` too.
+        MeshError
+            For a file that cannot be read, as by ``load_mesh``; the message names it. Also for a folder without mesh
+            files.
+
+        Notes
+        -----
+        Coordinates stay as they are in the files: in glTF y points up. What is left out is named by a
+        ``RepairWarning``.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> scene = RayScene.from_files(["scenes/models/torus_knot.ply", "scenes/models/stairs.ply"])
+        >>> [scene.name(object) for object in scene.objects]
+        ['torus_knot', 'stairs']
+        """
+        return cls._of(scene_of_files(paths, checked_threads(threads)))
+
+    @classmethod
+    def _of(cls, stored: StoredScene) -> RayScene:
+        """A scene that is ready for queries."""
+        scene = cls.__new__(cls)
+        RayScene.__init__(scene, threads=stored.built.threads)
+        scene._keep(stored)
+        return scene
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Copies and pickles have locks and addresses of their own."""
+        with self._lock:
+            stored = StoredScene(self._built, self._next)
+        kept = {name: value for name, value in vars(self).items() if name not in _OWN}
+        return {**kept, "stored": stored}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self._lock = RLock()
+        self._keep(state.pop("stored"))
+        vars(self).update(state)
+
+    def _keep(self, stored: StoredScene) -> None:
+        self._members, self._instances = stored.built.members, stored.built.top.instances
+        self._snapshot, self._next = stored
 
     @property
     def _built(self) -> BuiltScene:
@@ -381,31 +554,6 @@ class RayScene(SceneQueries):
 
     def _change(self, members: list[Member], instances: NDArray[np.float64]) -> None:
         self._members, self._instances, self._snapshot = members, instances, None
-
-
-def _place(member: Member, records: NDArray[np.float64], matrices: NDArray[np.float64]) -> None:
-    """Write the records of instances of a member. Raises ``ValueError`` naming the instance that cannot be placed."""
-    words = records.view(np.int64)
-    words[:, OBJECT] = member.row.ctypes.data
-    bad = place(matrices, records, words, 0, len(records))
-    expected = f"matrices that can be inverted, with coordinates up to {LARGEST:.3g}"
-    expect(bad < 0, "transforms", expected, f"{matrices[bad].tolist()} for instance {bad}")
-
-
-def _matrices(transforms: ArrayLike | None) -> NDArray[np.float64]:
-    """Transforms as (k, 3, 4) float64."""
-    given = _IDENTITY if transforms is None else real_argument("transforms", transforms)
-    fits = given.ndim in (2, 3) and given.shape[-2:] in ((3, 4), (4, 4))
-    expect(fits, "transforms", "shape (3, 4), (4, 4), (k, 3, 4) or (k, 4, 4)", f"shape {given.shape}")
-    with np.errstate(over="ignore", invalid="ignore"):  # what float64 cannot hold is rejected just below
-        matrices = np.array(given, np.float64).reshape(-1, *given.shape[-2:])
-    good = np.isfinite(matrices).all(axis=(1, 2))
-    if matrices.shape[1] == 4:
-        good &= (matrices[:, 3] == [0.0, 0.0, 0.0, 1.0]).all(axis=1)
-    if not good.all():
-        row = int((~good).argmax())
-        expect(False, "transforms", "finite matrices, the last row 0 0 0 1", f"{matrices[row].tolist()} in row {row}")
-    return np.ascontiguousarray(matrices[:, :3])
 
 
 def _composed(outer: NDArray[np.float64], inner: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -22,7 +22,7 @@ from renderer.arguments.types import ArrayLike
 from renderer.arguments.up import UP_AXES, up_axis
 from renderer.errors import MeshError, NoSuchSceneError, SceneError, expect, expect_known
 from renderer.lazy import lazy
-from renderer.mesh.load import MESH_SUFFIXES, load_mesh, mesh_suffix
+from renderer.mesh.load import MESH_SUFFIXES, FilePaths, load_mesh, mesh_paths, mesh_suffix
 from renderer.mesh.mesh import Mesh
 from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera, sample_offsets
 from renderer.scene.fields import Color, Fields, FiniteVector, Keys, SceneWarning, first_fault, shown, stated, thrice
@@ -511,16 +511,17 @@ class Scene(Fields):
 _PLACED = ("objects", "floor", "up")
 
 
-def load_scene(path: str | os.PathLike[str], *, up: Literal["x", "y", "z"] | None = None) -> Scene:
-    """Read a scene file and its meshes, or put a scene around a mesh file.
+def load_scene(path: FilePaths, *, up: Literal["x", "y", "z"] | None = None) -> Scene:
+    """Read a scene file and its meshes, or put a scene around mesh files.
 
     Parameters
     ----------
-    path : path
-        A ``.toml`` file, or a mesh file (.ply, .obj, .stl, .glb, .gltf). A camera that sees all of the mesh, a sky and
-        a floor are then chosen to fit; ``octree-render render --write-scene`` writes them as a scene file.
+    path : path, or iterable of paths
+        A ``.toml`` file, or mesh files (.ply, .obj, .stl, .glb, .gltf) and folders of them, each file an object. A
+        camera that sees all of them, a sky and a floor are then chosen to fit; ``octree-render render --write-scene``
+        writes them as a scene file.
     up : {"x", "y", "z"}, optional
-        The axis of a mesh file that points up, by default "y". A scene file has the key ``up`` instead.
+        The axis of mesh files that points up, by default "y". A scene file has the key ``up`` instead.
 
     Returns
     -------
@@ -543,19 +544,40 @@ def load_scene(path: str | os.PathLike[str], *, up: Literal["x", "y", "z"] | Non
     >>> scene.camera.type, sorted(scene.materials), len(scene.objects)
     ('orthographic', ['ground', 'stone'], 1)
     """
-    path = _scene_path(path)
-    if mesh_suffix(path):
-        try:
-            mesh = load_mesh(path)
-        except MeshError as error:
-            kind = NoSuchSceneError if isinstance(error, FileNotFoundError) else SceneError
-            raise kind(str(error)) from None
-        table = tomllib.loads(showcase_text(mesh, "model", _up_of_mesh(up)))
-        table["objects"][0]["mesh"] = mesh
-        return _checked(table, path)
+    files = scene_files(path)
+    if mesh_suffix(files[0]):
+        return _around(files, up)
     if up is not None:
         raise SceneError(f"up: expected None for a scene file, which has the key up, got {up!r}")
-    return _checked(_table(path), path)
+    table = _table(files[0])
+    for entry in _mesh_entries(table):
+        entry["mesh"] = files[0].parent / entry["mesh"]
+    return _checked(table, str(files[0]))
+
+
+def scene_files(path: FilePaths) -> list[Path]:
+    """The scene file at ``path``, or all mesh files there. Raises ``SceneError`` for other files beside each other."""
+    try:
+        files = mesh_paths(path)
+    except MeshError as error:
+        raise SceneError(str(error)) from None
+    other = [file for file in files if not mesh_suffix(file)]
+    if other and len(files) > 1:
+        raise SceneError(f"{other[0]}: expected a mesh file ({', '.join(MESH_SUFFIXES)}) beside others")
+    return files
+
+
+def _around(files: list[Path], up: str | None) -> Scene:
+    """A scene around mesh files."""
+    try:
+        meshes = [load_mesh(file) for file in files]
+    except MeshError as error:
+        kind = NoSuchSceneError if isinstance(error, FileNotFoundError) else SceneError
+        raise kind(str(error)) from None
+    table = tomllib.loads(showcase_text(meshes, ["model"] * len(meshes), _up_of_mesh(up)))
+    for entry, mesh in zip(table["objects"], meshes, strict=True):
+        entry["mesh"] = mesh
+    return _checked(table, ", ".join(map(str, files)))
 
 
 def _up_of_mesh(up: str | None) -> str:
@@ -606,38 +628,41 @@ def _mesh_entries(table: dict[str, Any]) -> list[dict[str, Any]]:
     return [entry for entry in entries or [] if isinstance(entry, dict) and isinstance(entry.get("mesh"), str)]
 
 
-def write_scene(mesh_file: str | Path, path: str | Path, up: str | None = None) -> None:
-    """Write the scene that ``load_scene(mesh_file, up=up)`` gives as a scene file, to be changed at will.
+def write_scene(mesh_files: FilePaths, path: str | Path, up: str | None = None) -> None:
+    """Write the scene that ``load_scene(mesh_files, up=up)`` gives as a scene file, to be changed at will.
 
     Raises ``ValueError`` unless ``path`` is that of a .toml file, and leads to no other kind.
     """
-    mesh_file, path = as_path("mesh_file", mesh_file), as_path("path", path)
+    files, path = scene_files(mesh_files), as_path("path", path)
     target = Path(os.path.realpath(path))
     for name in (path, target):
         leads = "" if name == path else f", a link to {target}"
         expect(name.suffix.lower() == ".toml", "path", "a .toml file", f"{path}{leads}")
+    text = showcase_text([load_mesh(file) for file in files], [_inside(file, path) for file in files], _up_of_mesh(up))
+    write_atomically(path, lambda file: file.write(text.encode()))
+
+
+def _inside(mesh_file: Path, path: Path) -> str:
+    """The path of a mesh file as a scene file at ``path`` has it."""
     # From beside the scene file as it is named, where ``load_scene`` looks, and not from where a link may lead.
     inside = os.path.relpath(mesh_file.resolve(), path.parent.resolve())
     is_text = inside.encode(errors="replace").decode() == inside
     expect(is_text, "mesh", "a name in UTF-8, as TOML has no other", ascii(inside))
-    text = showcase_text(load_mesh(mesh_file), Path(inside).as_posix(), _up_of_mesh(up))
-    write_atomically(path, lambda file: file.write(text.encode()))
+    return Path(inside).as_posix()
 
 
-def _checked(table: dict[str, Any], path: Path) -> Scene:
-    """The scene in a file's table, whose meshes are loaded."""
-    for entry in _mesh_entries(table):
-        entry["mesh"] = path.parent / entry["mesh"]
+def _checked(table: dict[str, Any], where: str) -> Scene:
+    """The scene in a file's table, whose meshes are loaded; ``where`` begins the messages of faults."""
     try:
         scene = Scene.model_validate(table)
     except ValidationError as error:
-        raise SceneError(f"{path}: {first_fault(error, Scene._union_member)}") from None
+        raise SceneError(f"{where}: {first_fault(error, Scene._union_member)}") from None
     try:
         with np.errstate(all="ignore"):
             _ = scene.instances
     except MeshError as error:
-        raise SceneError(f"{path}: objects: {' '.join(str(error).split())}") from None
-    warn_of_slips(scene.camera, scene.materials, f"{path}: ")
+        raise SceneError(f"{where}: objects: {' '.join(str(error).split())}") from None
+    warn_of_slips(scene.camera, scene.materials, f"{where}: ")
     return scene
 
 

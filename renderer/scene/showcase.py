@@ -1,8 +1,8 @@
-"""A scene for a mesh alone: a camera that sees all of it, a sky, and a floor that has no end."""
+"""A scene for meshes alone: a camera that sees all of them, a sky, and a floor that has no end."""
 
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,22 +42,24 @@ def _irradiance(sky: Sky, up: str) -> NDArray[np.float64]:
     return -ways[:, UP_AXES[up]] @ np.array([light.irradiance for light in lights])
 
 
-def showcase_text(mesh: Mesh, path: str, up: str) -> str:
-    """The scene file, as TOML, that shows ``mesh``; ``path`` is that of its file, as the scene file names it.
+def showcase_text(meshes: Sequence[Mesh], paths: Sequence[str], up: str) -> str:
+    """The scene file, as TOML, that shows ``meshes``; ``paths`` are those of their files, as the scene file names them.
 
-    The mesh is moved so that it stands in the middle of the floor; ``up`` is the axis that points up.
+    Together they are moved to stand in the middle of the floor; ``up`` is the axis that points up.
     """
-    lower, upper = mesh.bounds
-    radius = float(np.linalg.norm(mesh.extent)) / 2.0 or 1.0
+    bounds = np.array([mesh.bounds for mesh in meshes])
+    lower, upper = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
+    extent = upper - lower
+    radius = float(np.linalg.norm(extent)) / 2.0 or 1.0
     axis, turn, target = UP_AXES[up], turn_to(up), np.zeros(3)
-    target[axis] = float(mesh.extent[axis]) / 2.0
+    target[axis] = float(extent[axis]) / 2.0
     moved = -(lower + upper) / 2.0
     moved[axis] = -lower[axis]
     towards = turn @ _TOWARDS_EYE / np.linalg.norm(_TOWARDS_EYE)
     eye = target + towards * (_MARGIN * radius / math.sin(math.radians(_FOV) / 2.0))
     half, sky = _FLOOR * radius, _studio(up)
-    quoted = json.dumps(path).replace("\x7f", "\\u007f")  # as TOML has it
-    return f"""# Made for {quoted}: change what you like.
+    quoted = [json.dumps(path).replace("\x7f", "\\u007f") for path in paths]  # as TOML has it
+    return f"""# Made for {", ".join(quoted)}: change what you like.
 
 up = "{up}"
 ambient = 0.15
@@ -72,14 +74,7 @@ samples = 4
 glass_shadows = "clear"
 terminator = "soft"
 
-[[objects]]
-mesh = {quoted}
-material = "model"
-normals = "smooth"
-crease = {_CREASE}
-translate = {_list(moved)}
-
-[floor]
+{"".join(_object(path, moved) for path in quoted)}[floor]
 min = {_list((-half, -half))}
 max = {_list((half, half))}
 materials = ["floor"]
@@ -99,6 +94,17 @@ zenith = {_list(sky.zenith)}
 horizon = {_list(sky.horizon)}
 sun = {_list(turn_to(up) @ _SUN)}
 sun_irradiance = {_SUN_IRRADIANCE}
+"""
+
+
+def _object(path: str, moved: Iterable[float]) -> str:
+    return f"""[[objects]]
+mesh = {path}
+material = "model"
+normals = "smooth"
+crease = {_CREASE}
+translate = {_list(moved)}
+
 """
 
 

@@ -160,7 +160,7 @@ def _made_for(scene: Scene, name: str) -> str:
     """The scene file of the scene that ``load_scene`` put around a mesh file of that name."""
     (mesh,) = (thing.mesh for thing in scene.objects)
     assert isinstance(mesh, Mesh)
-    return showcase_text(mesh, name, scene.up)
+    return showcase_text([mesh], [name], scene.up)
 
 
 def _text_of(path: Path) -> str:

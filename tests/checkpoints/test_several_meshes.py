@@ -100,6 +100,18 @@ class TestFiles:
         assert Path("a.npy").read_bytes() == Path("b.npy").read_bytes()
         assert np.load("a.npy").tobytes() == sky_of(Mesh.concatenate([BODIES["low.ply"], GROUND])).tobytes()
 
+    def test_a_folders_files_are_given_in_the_order_of_their_names(
+        self, folder: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        (folder / "notes.txt").write_text("no mesh")
+        study("sky", folder, "-o", "a.npy", "--hide", "low.*")
+        lines = capsys.readouterr().out.splitlines()[-2:]
+        assert [line.split()[-1] for line in lines] == [str(folder / name) for name in ("ground.ply", "high.obj")]
+        study("sky", "ground.ply", "high.obj", "-o", "b.npy", "--quiet")
+        assert Path("a.npy").read_bytes() == Path("b.npy").read_bytes()
+        assert main(["study", "sky", ".", "-o", "low.ply"]) == 2
+        assert capsys.readouterr().err == "octree-render: --output: expected a file that is not an input, got low.ply\n"
+
     def test_a_file_given_twice_is_refused(self, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert main(["study", "sky", "low.ply", "./low.ply", "-o", "a.npy"]) == 2
         assert capsys.readouterr().err == "octree-render: mesh: expected each file once, got low.ply, low.ply\n"

@@ -90,7 +90,7 @@ def test_help_and_version(capsys: pytest.CaptureFixture[str], arguments: list[st
     ("arguments", "says"),
     [
         (["none.toml"], ["none.toml", "No such file"]),
-        ([ROOT], ["Is a directory"]),
+        ([ROOT], ["expected mesh files", "in the folder, got none"]),
         ([STAIRS, "-o", "none/a.png"], ["output", "existing folder"]),
         ([STAIRS, "-o", "a.jpg"], ["output", ".png, .exr or .npy", "a.jpg"]),
         ([STAIRS, "-o", "renderer"], ["output", ".png, .exr or .npy"]),

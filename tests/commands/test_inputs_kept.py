@@ -31,12 +31,13 @@ def folder(tmp_path, monkeypatch):
         ("m.ply", "m.ply", "link.png"),
         ("stairs.toml", "stairs.toml", "link.png"),
         ("stairs.toml", "models/stairs.ply", "link.npy"),
+        ("m.ply models", "models/stairs.ply", "link.npy"),
     ],
 )
 def test_a_picture_is_not_written_over_its_scene(folder, capsys, scene, lost, output):
     (folder / output).symlink_to(lost)
     before = (folder / lost).read_bytes()
-    assert cli.main(["render", scene, "-o", output, *SMALL]) == 2
+    assert cli.main(["render", *scene.split(), "-o", output, *SMALL]) == 2
     assert "--output: expected another file than the scene's own" in capsys.readouterr().err
     assert (folder / lost).read_bytes() == before
 

@@ -237,8 +237,8 @@ def checkout(tmp_path, monkeypatch):
     for name in ("scenes", "renderer", "validation", "tests"):
         (tmp_path / name).symlink_to(ROOT / name)
     (tmp_path / "houses").mkdir()
-    for name in ("houses/1.obj", "houses/tree_1.obj", "terrain.obj"):
-        (tmp_path / name).write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    for z, name in enumerate(("houses/1.obj", "houses/tree_1.obj", "terrain.obj")):
+        (tmp_path / name).write_text(f"v 0 0 {z}\nv 1 0 {z}\nv 0 1 {z}\nf 1 2 3\n")
     for name in ("city.ply", "scan.ply"):
         save_ply(box((0.0, 0.0, 0.0), (4.0, 3.0, 2.0)), tmp_path / name)
     (tmp_path / "suns.txt").write_text("1 0 1\n-1 0 1\n")

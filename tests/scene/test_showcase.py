@@ -72,6 +72,59 @@ def test_the_command_line_takes_a_mesh(tmp_path: Path, capsys: Any, command: str
     assert command == "info" or (out.exists() and load_scene(written).floor)
 
 
+@pytest.fixture
+def pair(tmp_path: Path) -> Path:
+    """A folder with two mesh files, the first and the last by their names far from each other."""
+    (tmp_path / "pair").mkdir()
+    file_of(tmp_path / "pair", SHAPES["ball"], offset=(5, 0, 0), name="z.ply")
+    file_of(tmp_path / "pair", SHAPES["ring"], name="a.ply")
+    return tmp_path / "pair"
+
+
+@pytest.mark.judges("octree-render render --write-scene", "octree-render render scene")
+def test_several_meshes_are_objects_of_one_scene(pair: Path, capsys: Any) -> None:
+    files = [str(pair / "a.ply"), str(pair / "z.ply")]
+    rest = ["--resolution", "40x30", "--up", "y", "--quiet"]
+    assert main(["render", *files, "-o", str(pair / "a.npy"), "--write-scene", str(pair / "it.toml"), *rest]) == 0
+    assert main(["render", str(pair), "-o", str(pair / "b.npy"), *rest]) == 0
+    assert np.load(pair / "a.npy").tobytes() == np.load(pair / "b.npy").tobytes()
+    scene = load_scene(pair)
+    assert [thing.mesh.name for thing in scene.objects if isinstance(thing.mesh, Mesh)] == ["a", "z"]
+    for found in (scene, load_scene(pair / "it.toml")):
+        image = render(found, resolution=(40, 30))
+        assert image.radiance.tobytes() == np.load(pair / "a.npy").tobytes()
+    # Both are seen, as far apart as they are, and stand on the floor as one.
+    bounds = [part.mesh.bounds for part in scene.instances[:2]]
+    count = len(scene.instances[0].mesh.faces)
+    assert (image.face < count).any() and ((image.face >= count) & (image.face < count + 1280)).any()
+    assert min(lower[1] for lower, _ in bounds) == 0.0
+    apart = SHAPES["ball"].bounds[0][0] + 5 - SHAPES["ring"].bounds[0][0]
+    assert bounds[1][0][0] - bounds[0][0][0] == pytest.approx(apart)
+
+
+def test_of_several_meshes_one_line_says_which_axis_is_taken(pair: Path, capsys: Any) -> None:
+    words = ["--resolution", "4x4", "-o", str(pair / "a.png")]
+    assert main(["render", str(pair), *words]) == 0
+    taken = "not say which axis points up: y was taken; --up x|y|z changes it\n"
+    assert capsys.readouterr().err == f"octree-render: the mesh files do {taken}"
+
+
+@cases(
+    ("names", "message"),
+    [
+        (["a.ply", "it.toml"], r"it\.toml: expected a mesh file \(\.ply, .*\) beside others"),
+        (["a.ply", "none.ply"], r"none\.ply: cannot be read: No such file"),
+        (["."], r"expected mesh files \(\.ply, .*\) in the folder, got none"),
+    ],
+)
+def test_files_that_make_no_scene_together_are_named(tmp_path: Path, names: list[str], message: str) -> None:
+    (tmp_path / "it.toml").write_text("")
+    if names != ["."]:
+        file_of(tmp_path, SHAPES["box"], name="a.ply")
+    with pytest.raises(SceneError, match=message):
+        load_scene([tmp_path / name for name in names])
+
+
 def test_only_of_a_mesh_a_scene_is_written(tmp_path: Path, capsys: Any) -> None:
     scene = Path(__file__).parents[2] / "scenes" / "stairs.toml"
     arguments = ["render", str(scene), "-o", str(tmp_path / "a.png"), "--write-scene", str(tmp_path / "b.toml")]

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from forged import Change, forge
 from meshes import answers, make_mesh, rays_at
 from numpy.typing import NDArray
 from signatures import SIGNATURES
@@ -24,7 +25,7 @@ from renderer import Mesh, Octree
 from renderer.mesh.shapes import icosphere
 from renderer.system import files
 from renderer.trace.layout import BLOCK_WORDS, CACHE_LINE, CHILDREN, NODE_WORDS
-from renderer.tree import store
+from renderer.tree import container, store
 
 pytestmark = pytest.mark.judges("Octree.load", "Octree.save")
 
@@ -123,7 +124,7 @@ def test_a_class_of_ones_own_is_loaded_as_such(path: Path) -> None:
 
 
 def test_the_file_is_as_its_description_says(path: Path) -> None:
-    """Read by ``struct``, ``json`` and ``zlib``, from the text at the head of ``store.py``."""
+    """Read by ``struct``, ``json`` and ``zlib``, from the texts at the heads of ``container.py`` and ``store.py``."""
     saved = Octree.from_mesh(carrying())
     saved.save(path)
     content = path.read_bytes()
@@ -338,42 +339,24 @@ def test_flipped_bits_in_a_map_are_refused_or_harmless(path: Path) -> None:
 # --- forged files -----------------------------------------------------------------------------------------------
 
 
-def forged(content: bytes, change: Callable[[dict[str, Any]], object], **arrays: NDArray[Any]) -> bytes:
-    """A file with other entries of the header, or other arrays, and with the right checksums."""
-    length = struct.unpack("<I", content[16:20])[0]
-    told, begin, parts = json.loads(content[24 : 24 + length]), 24 + length, []
-    for entry in told["arrays"]:
-        dtypes, row = store._KINDS[entry["name"]]
-        assert entry["dtype"] in dtypes
-        size = entry["rows"] * int(np.prod(row)) * int(entry["dtype"][-1])
-        part = content[begin : begin + size]
-        begin += -(-size // 64) * 64
-        if entry["name"] in arrays:
-            part = arrays[entry["name"]].tobytes()
-            entry["rows"] = len(part) * entry["rows"] // size
-        parts.append(part + bytes(-len(part) % 64))
-        entry["crc32"] = zlib.crc32(parts[-1])
-    change(told)
-    text = json.dumps(told).encode()
-    text += b" " * (-(24 + len(text)) % 64)
-    start = content[:16] + struct.pack("<I", len(text))
-    return start + struct.pack("<I", zlib.crc32(text, zlib.crc32(start))) + text + b"".join(parts)
+def forged(content: bytes, change: Change, **arrays: NDArray[Any]) -> bytes:
+    return forge(content, store._KINDS, change, **arrays)
 
 
 def nothing(told: dict[str, Any]) -> None:
     """No change of the header."""
 
 
-def entry(which: str, /, **values: Any) -> Callable[[dict[str, Any]], object]:
+def entry(which: str, /, **values: Any) -> Change:
     """A change of what the header says of one array."""
     return lambda told: next(e for e in told["arrays"] if e["name"] == which).update(values)
 
 
-def without(name: str) -> Callable[[dict[str, Any]], object]:
+def without(name: str) -> Change:
     return lambda told: told.update(arrays=[e for e in told["arrays"] if e["name"] != name])
 
 
-HEADERS: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
+HEADERS: dict[str, tuple[Change, str]] = {
     "no depth": (lambda told: told.pop("depth"), "header: expected the keys"),
     "a key more": (lambda told: told.update(more=1), "header: expected the keys"),
     "depth -1": (lambda told: told.update(depth=-1), "depth: expected an integer from 0 to 256, got -1"),
@@ -588,7 +571,7 @@ def test_a_file_that_cannot_be_written_stays_as_it_was(
     if failing == "replace":
         monkeypatch.setattr(files.os, "replace", refuse)
     else:
-        monkeypatch.setattr(store, "_zeros_after", refuse)
+        monkeypatch.setattr(container, "_zeros_after", refuse)
     with pytest.raises(OSError, match="No space left on device"):
         SAVED["carrying"]().save(path)
     assert path.read_bytes() == content and os.listdir(path.parent) == [path.name]

@@ -156,7 +156,7 @@ def _other(rng: Generator) -> NDArray[np.bool_]:
 
 
 def _with(whole: bytes, order: int, version: int) -> bytes:
-    """A file of the given version, or with the bytes that tell the order turned, as ``tree/store.py`` has them."""
+    """A file of the given version, or with the bytes that tell the order turned, as ``tree/container.py`` has them."""
     told = whole[8:12][::order] + struct.pack("<I", version) + whole[16:20]
     text = whole[24 : 24 + struct.unpack("<I", whole[16:20])[0]]
     return whole[:8] + told + struct.pack("<I", zlib.crc32(whole[:8] + told + text)) + whole[24:]
