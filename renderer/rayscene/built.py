@@ -137,8 +137,8 @@ def _top(
     box_all(instances, words, shown, order.boxes, order.numbers)
     nodes, block_faces, depth = build_nodes(order, _RULE, threads)
     links = nodes.view(np.int32).reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8]
-    used = nodes.reshape(-1, NODE_WORDS)[:, :8] <= nodes.reshape(-1, NODE_WORDS)[:, 8:16]
-    leaves = used & (links < 0)
+    # Those of empty octants too, as a ray enters one where boxes are NaN: they become the first of all.
+    leaves = links < 0
     links[leaves] = ~shown[block_faces[4 * (~links[leaves] >> LEAF_BITS)]].astype(np.int32)
     return nodes, depth
 
