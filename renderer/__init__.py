@@ -14,6 +14,8 @@ The public names::
         Hits, AllHits        the nearest hit of each ray, and all hits
         ClosestPoints        the nearest point of the mesh to each point
         Steps                the work that a search takes
+        RayScene             many meshes, each placed many times, with the queries of Octree; it has SceneHits,
+                             SceneAllHits and SceneClosestPoints
 
     Scenes and pictures
         load_scene           a scene from a .toml file, or around a mesh file

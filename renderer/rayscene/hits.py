@@ -32,27 +32,77 @@ class _Places:
 
     @property
     def object(self) -> NDArray[np.int64]:
-        """The objects, as ``RayScene.add`` numbers them, (...) int64; -1 on a miss."""
+        """The objects, as ``RayScene.add`` numbers them, (...) int64; -1 on a miss.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cubes = scene.add(box(), transforms=[[[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 0]] for x in (0, 3)])
+        >>> scene.closest_hit([[3.5, 0.25, 9], [9, 9, 9]], [0, 0, -1]).object
+        array([ 0, -1])
+        """
         return self._at.object
 
     @property
     def instance(self) -> NDArray[np.int64]:
-        """Which of the object's instances, (...) int64; -1 on a miss."""
+        """Which of the object's instances, (...) int64; -1 on a miss.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cubes = scene.add(box(), transforms=[[[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 0]] for x in (0, 3)])
+        >>> scene.closest_hit([[3.5, 0.25, 9], [9, 9, 9]], [0, 0, -1]).instance
+        array([ 1, -1])
+        """
         return self._at.instance
 
     @property
     def face(self) -> NDArray[np.int64]:
-        """The faces of the objects' meshes, (...) int64; -1 on a miss."""
+        """The faces of the objects' meshes, (...) int64; -1 on a miss.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cubes = scene.add(box(), transforms=[[[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 0]] for x in (0, 3)])
+        >>> scene.closest_hit([[3.5, 0.25, 9], [9, 9, 9]], [0, 0, -1]).face
+        array([10, -1])
+        """
         return self._at.face
 
     @property
     def u(self) -> NDArray[np.float64]:
-        """Barycentrics on the mesh: the point is (1 - u - v) p0 + u p1 + v p2, placed, (...) float64; nan on a miss."""
+        """Barycentrics on the mesh: the point is (1 - u - v) p0 + u p1 + v p2, placed, (...) float64; nan on a miss.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cubes = scene.add(box(), transforms=[[[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 0]] for x in (0, 3)])
+        >>> scene.closest_hit([[3.5, 0.25, 9], [9, 9, 9]], [0, 0, -1]).u
+        array([0.25,  nan])
+        """
         return self._at.u
 
     @property
     def v(self) -> NDArray[np.float64]:
-        """See ``u``."""
+        """The weight of the third corner, see ``u``, (...) float64; nan on a miss.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cubes = scene.add(box(), transforms=[[[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 0]] for x in (0, 3)])
+        >>> scene.closest_hit([[3.5, 0.25, 9], [9, 9, 9]], [0, 0, -1]).v
+        array([0.25,  nan])
+        """
         return self._at.v
 
     @property

@@ -89,7 +89,7 @@ class SceneQueries:
         >>> hits.object, hits.t
         (array([0, 1, 1]), array([8., 6., 6.]))
         >>> scene.closest_hit([0.5, 0.25, 9], [0, 0, -1], ignore=hits).object
-        array([ 1,  0,  0])
+        array([1, 0, 0])
         """
         built = self._built
         rays, shape = rays_of(built, origins, directions, t_min, t_max, Choice(leaving, mask, ignore, faces))

@@ -334,7 +334,17 @@ class RayScene(SceneQueries):
         return [m.id for m in self._members]
 
     def name(self, object: int) -> str:
-        """Return the name of an object."""
+        """Return the name of an object.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box(), name="cube")
+        >>> scene.name(cube)
+        'cube'
+        """
         return self._member(object).name
 
     def instance_names(self, object: int) -> tuple[str, ...]:
@@ -351,11 +361,31 @@ class RayScene(SceneQueries):
         return self._member(object).names
 
     def mesh(self, object: int) -> Mesh:
-        """Return the mesh of an object, to which ``face`` of a hit refers."""
+        """Return the mesh of an object, to which ``face`` of a hit refers.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box(), name="cube")
+        >>> scene.mesh(cube).extent.tolist()
+        [1.0, 1.0, 1.0]
+        """
         return self._member(object).built.mesh
 
     def transforms(self, object: int) -> NDArray[np.float64]:
-        """Return where the instances of an object stand, (k, 3, 4)."""
+        """Return where the instances of an object stand, (k, 3, 4).
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box(), name="cube")
+        >>> scene.transforms(cube).shape
+        (1, 3, 4)
+        """
         built = self._built
         return next(built.matrices(m) for m in built.members if m.id == self._member(object).id)
 

@@ -314,10 +314,13 @@ def placed(at: tuple[int, ...], value: float) -> dict[str, NDArray[Any]]:
     return {"transforms": matrices}
 
 
+_PLACED = "transforms: expected matrices that can be inverted, with coordinates up to 1.15e+18, got "
+
+
 ARRAYS: dict[str, tuple[dict[str, NDArray[Any]], str]] = {
     "nan": (placed((3, 1, 3), np.nan), "transforms: expected finite matrices"),
-    "singular": (placed((3, 1), 0.0), "transforms: expected matrices that can be inverted, with coordinates up to 1.15e+18, got "),
-    "far away": (placed((3, 1, 3), 1e300), "transforms: expected matrices that can be inverted, with coordinates up to 1.15e+18, got "),
+    "singular": (placed((3, 1), 0.0), _PLACED),
+    "far away": (placed((3, 1, 3), 1e300), _PLACED),
     "fewer transforms": ({"transforms": transforms(34)}, "flags: expected a row an instance, 34, got 35"),
     "more of both": (
         {"transforms": transforms(36), "flags": np.ones(36, np.int64)}, "objects: expected 36 instances in all, got 35",
