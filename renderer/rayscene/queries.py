@@ -244,8 +244,8 @@ class SceneQueries:
         >>> from renderer.mesh.shapes import box
         >>> scene = RayScene()
         >>> cube = scene.add(box())
-        >>> scene.count_steps([0.5, 0.25, 9], [0, 0, -1]).nodes > 1
-        array(True)
+        >>> scene.count_steps([[0.5, 0.25, 9], [5, 5, 5]], [0, 0, -1]).nodes.tolist()
+        [1, 1]
         """
         built = self._built
         rays, shape = rays_of(built, origins, directions, t_min, t_max, Choice(leaving, mask, ignore, faces))
@@ -306,8 +306,8 @@ class SceneQueries:
         >>> from renderer.mesh.shapes import box
         >>> scene = RayScene()
         >>> cube = scene.add(box())
-        >>> scene.winding_number([0.5, 0.5, 0.5]).round(9)
-        array(1.)
+        >>> scene.winding_number([[0.5, 0.5, 0.5]]).round(9)
+        array([1.])
         """
         return self._built.merged.winding_number(points, tolerance)
 
