@@ -265,7 +265,6 @@ def _cloud(hits: Hits | SceneHits, hit: Integers, beams: _Beams, t: Floats, numb
     """The points of the rays ``hit``, which have come as far as ``t``."""
     directions, normals = beams.directions[hit], hits.normals[hit]
     lengths = lengths_of(directions)
-    # rule: cosine-of-incidence
     cosines = np.minimum(np.abs((normals * directions).sum(axis=1)) / lengths, 1.0)
     objects = instances = np.zeros(len(hit), np.int64)
     if isinstance(hits, SceneHits):
