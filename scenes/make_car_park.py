@@ -115,10 +115,8 @@ class Park(NamedTuple):
 
 def directions(columns: int, rings: int) -> Floats:
     """The directions of a turn, column by column."""
-    turn, rise = (
-        np.linspace(np.pi, -np.pi, columns, endpoint=False)[:, None],
-        np.radians(np.linspace(-25.0, 5.0, rings)),
-    )
+    turn = np.linspace(np.pi, -np.pi, columns, endpoint=False)[:, None]
+    rise = np.radians(np.linspace(-25.0, 5.0, rings))
     ways = [np.cos(turn) * np.cos(rise), np.sin(turn) * np.cos(rise), np.broadcast_to(np.sin(rise), (columns, rings))]
     return np.stack(ways, axis=2).reshape(-1, 3)
 
@@ -174,7 +172,8 @@ def woods(rng: np.random.Generator, x: Floats, y: Floats) -> Floats:
     around = rng.uniform(-1.0, 1.0, (2, 40 * _AROUND)) * [[97.0], [72.0]]
     around = around[:, (np.abs(around[0]) > 76.0) | (np.abs(around[1]) > 46.0)][:, :_AROUND]
     x, y = np.append(x, around[0]), np.append(y, around[1])
-    return rng.permuted(np.stack([x, y, rng.uniform(0.0, 7.0, len(x)), rng.uniform(0.7, 1.3, len(x))]).T, axis=0).T
+    stands = np.stack([x, y, rng.uniform(0.0, 7.0, len(x)), rng.uniform(0.7, 1.3, len(x))])
+    return rng.permutation(stands, axis=1)
 
 
 def height(x: ArrayLike, y: ArrayLike) -> Floats:
@@ -260,7 +259,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         colors, none = park.colors(cloud.objects), np.empty((0, 3), np.int32)
         Mesh(cloud.points, none, colors=colors).save(options.folder / f"frame_{frame:03}.ply")
         points += len(cloud.points)
-    print(f"{park.scene}: {options.frames} frames, {points:,} points in {options.folder}")
+    print(f"{park.scene}; frames: {options.frames}; points: {points:,}")
     return 0
 
 
