@@ -14,10 +14,10 @@ from renderer.rayscene.built import BuiltScene
 from renderer.rayscene.hits import SceneHits
 from renderer.results.hits import Hits
 from renderer.studies.share import Snapshot
-from renderer.trace.batch import ALL, Leaving, check_rays, offset_origins
+from renderer.trace.batch import Leaving, check_rays, offset_origins
 from renderer.trace.closest import closest_hits
 from renderer.trace.starts.cone import HOLDERS_WORDS
-from renderer.trace.starts.record import ANCHOR, CODE, FACE, HEAD, IGNORED, MASK, ROW, WAY
+from renderer.trace.starts.record import ALL, ANCHOR, CODE, FACE, HEAD, IGNORED, MASK, ROW, WAY
 from renderer.trace.starts.search import side_taken
 from renderer.trace.walk import stack_size
 
@@ -29,18 +29,19 @@ def hits_from_stand(
 ) -> Hits | SceneHits:
     """The first hits of rays (k, 3) from a place: if on the surface, on the side of the normal or the outer side."""
     built, threads = surfaces._built, surfaces.threads
-    rays, _ = check_rays(place, directions, 0.0, reach)
     row = _row_at(built, place, threads)
-    if row[FACE] >= 0.0:
-        own, face = _mesh_with(built, int(row[FACE]))
-        # rule: outer-side-of-scanner
-        outer = face_normals(own.vertices[own.faces[face : face + 1]])[0] if normal is None else normal
-        own, face = _take_side(built, row, outer)
-        count, code = len(directions), row[[CODE]].astype(np.int64)
-        leaving = Leaving(np.full(count, face), code, np.tile(row[ANCHOR : ANCHOR + 3], (count, 1)))
-        rays = offset_origins(rays, leaving, own, built.tree.scale, threads)
-        rows = rays.starts[HEAD:].view(np.float64).reshape(count, ROW)
-        rows[:, FACE], rows[:, WAY : WAY + 3], rows[:, MASK], rows[:, IGNORED] = row[FACE], outer, ALL, -1.0
+    if row[FACE] < 0.0:
+        return surfaces.closest_hit(place, directions, t_max=reach)
+    own, face = _mesh_with(built, int(row[FACE]))
+    # rule: outer-side-of-scanner
+    outer = face_normals(own.vertices[own.faces[face : face + 1]])[0] if normal is None else normal
+    own, face = _take_side(built, row, outer)
+    count, code = len(directions), row[[CODE]].astype(np.int64)
+    leaving = Leaving(np.full(count, face), code, np.tile(row[ANCHOR : ANCHOR + 3], (count, 1)))
+    rays, _ = check_rays(place, directions, 0.0, reach)
+    rays = offset_origins(rays, leaving, own, built.tree.scale, threads)
+    rows = rays.starts[HEAD:].view(np.float64).reshape(count, ROW)
+    rows[:, FACE], rows[:, WAY : WAY + 3], rows[:, MASK], rows[:, IGNORED] = row[FACE], outer, ALL, -1.0
     hits = closest_hits(built.tree, rays, built.mesh, threads)
     return SceneHits(hits, built) if isinstance(built, BuiltScene) else hits
 
