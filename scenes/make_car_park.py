@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from renderer import Mesh, RayScene
+from renderer import Mesh, PerspectiveCamera, RayScene
 from renderer.mesh.heightfield import heightfield_mesh
 from renderer.shapes import box
 from renderer.studies import Scan, scan
@@ -35,6 +35,8 @@ _DRIVING, _SPEED, _OWN_SPEED, _MAST = 4, 6.0, 8.0, 1.85
 TURN = 0.1
 # The masks of all, and of the car with the scanner, which does not scan itself.
 SEEN, OWN = 1, 2
+# Where the sun is, and the colour of the sky.
+_SUN, _SKY = np.array([0.5, -0.6, 0.65]), (0.75, 0.85, 0.95)
 # What objects are, and their colours.
 COLORS = {
     "ground": (0.45, 0.50, 0.56), "hatchback": (1.0, 0.62, 0.18), "saloon": (0.30, 0.68, 1.0), "van": (1.0, 0.36, 0.45),
@@ -88,11 +90,15 @@ class Park(NamedTuple):
             for each in fleet.objects:
                 self.scene.move(each, fleet.poses(rows, seconds), instances=rows)
 
+    def scanner(self, moments: Floats) -> Floats:
+        """The poses of the scanner, which is above its car."""
+        places = self.fleets["saloon"].poses(np.zeros(len(moments), np.int64), moments)
+        places[:, :, 3] += _MAST * places[:, :, 2]
+        return places
+
     def scan(self, seconds: float, columns: int = 1024, rings: int = 64) -> Scan:
         """A turn of the scanner, which goes on between columns, and sees through windows."""
-        moments = seconds + TURN * np.arange(columns) / columns
-        scanner = self.fleets["saloon"].poses(np.zeros(columns, np.int64), moments)
-        scanner[:, :, 3] += _MAST * scanner[:, :, 2]
+        scanner = self.scanner(seconds + TURN * np.arange(columns) / columns)
         glass = [number for number, kind in enumerate(self.kinds) if kind == "glass"]
         return scan(
             self.scene, np.repeat(scanner, rings, axis=0), directions(columns, rings), max_distance=120.0, returns=3,
@@ -111,6 +117,29 @@ class Park(NamedTuple):
     def colors(self, objects: Integers) -> Floats:
         """The colour (n, 3) of each object."""
         return np.array([COLORS[kind] for kind in self.kinds])[objects]
+
+    def picture(self, camera: PerspectiveCamera, width: int, height: int) -> Floats:
+        """What a camera sees (height, width, 3), in the sun or in the shade, by four rays a pixel."""
+        hits = self.scene.closest_hit(*camera.primary_rays((2 * width, 2 * height)))
+        shaded = self.scene.any_hit(np.where(hits.hit[..., None], hits.points, 0.0), _SUN, leaving=hits)
+        light = 0.35 + 0.65 * np.where(shaded, 0.0, np.abs(hits.normals @ _SUN))
+        colors = np.where(hits.hit[..., None], self.colors(hits.object) * light[..., None], _SKY)
+        return colors.reshape(height, 2, width, 2, 3).mean(axis=(1, 3)).clip(0.0, 1.0)
+
+
+def drawn(points: Floats, colors: Floats, camera: PerspectiveCamera, width: int, height: int) -> Floats:
+    """Points on black (height, width, 3), as a camera sees them: squares of two pixels, the nearest in front."""
+    right, up, ahead = camera.frame()
+    way = points - np.array(camera.eye)
+    away = np.maximum(way @ ahead, 1.0)
+    pixels = height / 2.0 / np.tan(np.radians(camera.fov / 2.0)) / away
+    column, row = width / 2.0 + pixels * (way @ right), height / 2.0 - pixels * (way @ up)
+    seen = (away > 1.0) & (column >= 0.0) & (column < width - 1.0) & (row >= 0.0) & (row < height - 1.0)
+    order = np.flatnonzero(seen)[np.argsort(-away[seen])]
+    picture = np.full((height, width, 3), 0.04)
+    for down, along in np.ndindex(2, 2):
+        picture[row[order].astype(int) + down, column[order].astype(int) + along] = colors[order]
+    return picture
 
 
 def directions(columns: int, rings: int) -> Floats:
