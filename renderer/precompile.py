@@ -33,7 +33,8 @@ from renderer.scene.needs import needs_of
 from renderer.scene.scene import Scene, SceneObject
 from renderer.shade.tile import render_tile
 from renderer.studies.hidden import occlusion
-from renderer.studies.views import scan, visible_faces
+from renderer.studies.scanner import scan
+from renderer.studies.views import visible_faces
 from renderer.system import child
 from renderer.system.threads import available_threads
 

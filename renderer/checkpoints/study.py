@@ -15,6 +15,8 @@ from renderer.checkpoints.parts import Computed, Parts, Plan, digest_of
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
+from renderer.queryable import Queries
+from renderer.rayscene.scene import RayScene
 from renderer.studies.ambient import ambient_occlusion
 from renderer.studies.places import FacePoints
 from renderer.studies.points import Points
@@ -56,12 +58,12 @@ class Study:
     def __post_init__(self) -> None:
         expect(self.kind in KINDS, "kind", f"one of {list(KINDS)}", repr(self.kind))
 
-    def evaluate(self, octree: Octree, points: FacePoints | Points, threads: int | None = None) -> Floats:
+    def evaluate(self, octree: Queries | RayScene, points: FacePoints | Points, threads: int | None = None) -> Floats:
         """The result of each point, on this machine.
 
         Parameters
         ----------
-        octree : Octree
+        octree : Octree or RayScene
         points : FacePoints
             Such as those of ``studies.face_points``.
         threads : int, optional
@@ -116,7 +118,7 @@ def folder_of(output: Path) -> Path:
     return output.with_name(f"{output.name}.parts")
 
 
-def parts_of(octree: Octree, study: Study, points: Points, folder: Path, size: int | None = None) -> Parts:
+def parts_of(octree: Queries, study: Study, points: Points, folder: Path, size: int | None = None) -> Parts:
     """The parts of a study in a folder, new or left by a killed run. The points of a part lie together.
 
     Raises ``ValueError`` for bad points, normals, faces or options, and for the folder of another study.

@@ -11,17 +11,22 @@ from renderer.checkpoints.parts import digest_of
 from renderer.cluster.workers import SentMesh
 from renderer.errors import expect
 from renderer.octree import Octree
+from renderer.rayscene.scene import RayScene
+from renderer.studies.share import octree_of
 
 # A row of the hits of ``closest_hit``, as ``renderer.Hits`` has them: inf, -1 and nan where a ray hits nothing.
 HIT = np.dtype([("t", "f8"), ("face", "i8"), ("u", "f8"), ("v", "f8")])
 
 
-def closest_hit(octree: Octree, origins: Any, directions: Any, *, t_min: float = 0.0, t_max: float = np.inf) -> Any:
+def closest_hit(
+    octree: Octree | RayScene, origins: Any, directions: Any, *, t_min: float = 0.0, t_max: float = np.inf
+) -> Any:
     """The closest hits of rays in dask arrays, lazily.
 
     Parameters
     ----------
-    octree : Octree
+    octree : Octree or RayScene
+        Its mesh is sent to each worker once; of a scene that is the ``merged`` one, with all copies.
     origins, directions : dask.array.Array, shape (n, 3)
         The result has the chunks of the origins.
     t_min, t_max : float, default 0, inf
@@ -59,12 +64,14 @@ def closest_hit(octree: Octree, origins: Any, directions: Any, *, t_min: float =
     return _by_chunks(octree, origins, directions, trace, HIT)
 
 
-def any_hit(octree: Octree, origins: Any, directions: Any, *, t_min: float = 0.0, t_max: float = np.inf) -> Any:
+def any_hit(
+    octree: Octree | RayScene, origins: Any, directions: Any, *, t_min: float = 0.0, t_max: float = np.inf
+) -> Any:
     """Whether each of the rays in dask arrays hits anything, lazily.
 
     Parameters
     ----------
-    octree : Octree
+    octree : Octree or RayScene
     origins, directions : dask.array.Array, shape (n, 3)
     t_min, t_max : float, default 0, inf
         As for `closest_hit`.
@@ -95,7 +102,7 @@ def any_hit(octree: Octree, origins: Any, directions: Any, *, t_min: float = 0.0
     return _by_chunks(octree, origins, directions, trace, np.dtype(bool))
 
 
-def _by_chunks(octree: Octree, origins: Any, directions: Any, trace: Any, dtype: np.dtype[Any]) -> Any:
+def _by_chunks(octree: Octree | RayScene, origins: Any, directions: Any, trace: Any, dtype: np.dtype[Any]) -> Any:
     import dask.array as da
     from dask import delayed
 
@@ -106,7 +113,7 @@ def _by_chunks(octree: Octree, origins: Any, directions: Any, trace: Any, dtype:
     expect(same, "directions", f"shape {origins.shape} as origins have", f"shape {directions.shape}")
     o = origins.rechunk({1: 3})
     d = directions.rechunk((o.chunks[0], (3,)))
-    mesh = octree.mesh
+    mesh = octree_of(octree).mesh
     digest = digest_of(mesh.vertices, mesh.faces)
     # One task that all chunks need: a cluster keeps what it returns on each worker that asked for it.
     sent = delayed(SentMesh(digest, mesh.vertices, mesh.faces, "midpoint"), name=f"mesh-{digest}", traverse=False)

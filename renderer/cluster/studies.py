@@ -13,14 +13,16 @@ from renderer.cluster.workers import SentMesh, evaluate_part
 from renderer.errors import expect
 from renderer.octree import Octree
 from renderer.picture.render import check_tree
+from renderer.rayscene.scene import RayScene
 from renderer.studies.places import FacePoints
 from renderer.studies.points import Points
+from renderer.studies.share import octree_of
 from renderer.system.files import as_path
 
 
 def run_on(
     client: Any,
-    octree: Octree,
+    octree: Octree | RayScene,
     study: Study,
     points: FacePoints | Points,
     folder: str | Path,
@@ -35,8 +37,8 @@ def run_on(
     ----------
     client : distributed.Client
         See `connected`.
-    octree : Octree
-        Its mesh is sent to each worker once, which builds the tree.
+    octree : Octree or RayScene
+        As for `closest_hit`. The workers build the tree.
     study : Study
         What is computed.
     points : FacePoints
@@ -80,10 +82,10 @@ def run_on(
     ...     run_on(client, floor, Study("sky"), face_points(floor.mesh), Path(folder) / "parts").joined().tolist()
     [1.0]
     """
-    points = Points(*points) if isinstance(points, FacePoints) else points
-    folder = _checked(octree, study, points, folder, size, split)
-    mesh = octree.mesh
-    parts = parts_of(octree, study, points, folder, size)
+    whole, points = octree_of(octree), Points(*points) if isinstance(points, FacePoints) else points
+    folder = _checked(whole, study, points, folder, size, split)
+    mesh = whole.mesh
+    parts = parts_of(whole, study, points, folder, size)
     sent = SentMesh(digest_of(mesh.vertices, mesh.faces), mesh.vertices, mesh.faces, split)
 
     def compute(missing: list[int]) -> Results:
@@ -96,7 +98,7 @@ def run_on(
 
 def _checked(octree: object, study: object, points: object, folder: object, size: object, split: object) -> Path:
     """The folder as a path. Raises ``ValueError`` for what a study on a cluster does not take."""
-    expect(isinstance(octree, Octree), "octree", "an Octree", type(octree).__name__)
+    expect(isinstance(octree, Octree), "octree", "an Octree or a RayScene", type(octree).__name__)
     expect(isinstance(study, Study), "study", "a Study", type(study).__name__)
     expect(isinstance(points, Points), "points", "FacePoints", type(points).__name__)
     count_argument("size", size, 1)

@@ -11,9 +11,9 @@ from .hidden import occlusion as occlusion
 from .places import FacePoints as FacePoints
 from .places import face_points as face_points
 from .places import sample_points as sample_points
+from .scanner import Scan as Scan
+from .scanner import scan as scan
 from .sky import sky_view_factor as sky_view_factor
 from .sky import sun_hours as sun_hours
-from .views import Scan as Scan
 from .views import depth_map as depth_map
-from .views import scan as scan
 from .views import visible_faces as visible_faces

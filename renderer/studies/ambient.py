@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.queryable import Queries
+from renderer.rayscene.scene import RayScene
 from renderer.studies.directions import Pattern, check_count, cosine_hemisphere, fibonacci_sphere
 from renderer.studies.share import StudyRequest, check_reach, check_request, evaluate, limits_of
 from renderer.studies.sweep import Sky
@@ -16,7 +17,7 @@ Floats = NDArray[np.float64]
 
 
 def ambient_occlusion(
-    octree: Queries,
+    octree: Queries | RayScene,
     points: ArrayLike,
     normals: ArrayLike,
     *,
@@ -33,7 +34,7 @@ def ambient_occlusion(
 
     Parameters
     ----------
-    octree : Octree or BruteForce
+    octree : Octree, BruteForce or RayScene
     points : array_like, shape (..., 3)
     normals : array_like, shape (..., 3) or (3,)
         As for `occlusion`, but not None.
@@ -75,11 +76,11 @@ def ambient_occlusion(
     request = check_request(octree, points, normals, leaving, threads, progress)
     check_count("samples", samples)
     reach = check_reach(max_distance, distance)
-    return _open_share(octree, request, cosine_hemisphere(samples), reach, turned=True)
+    return _open_share(request, cosine_hemisphere(samples), reach, turned=True)
 
 
 def openness(
-    octree: Queries,
+    octree: Queries | RayScene,
     points: ArrayLike,
     *,
     samples: int = 1024,
@@ -93,7 +94,7 @@ def openness(
 
     Parameters
     ----------
-    octree : Octree or BruteForce
+    octree : Octree, BruteForce or RayScene
     points : array_like, shape (..., 3)
         A point on the surface sees out through the faces that hold it.
     samples : int, default 1024
@@ -131,11 +132,11 @@ def openness(
     """
     request = check_request(octree, points, None, leaving, threads, progress)
     check_count("samples", samples)
-    return _open_share(octree, request, fibonacci_sphere(samples), check_reach(max_distance, distance), turned=False)
+    return _open_share(request, fibonacci_sphere(samples), check_reach(max_distance, distance), turned=False)
 
 
-def _open_share(octree: Queries, request: StudyRequest, pattern: Pattern, reach: float, *, turned: bool) -> Floats:
+def _open_share(request: StudyRequest, pattern: Pattern, reach: float, *, turned: bool) -> Floats:
     """The share of a pattern's directions that is open."""
     directions = pattern.directions
     sky = Sky(directions, np.ones(len(directions)), limits_of(reach, directions), turned, False)
-    return evaluate(octree, request, sky, hidden=False, share=True)
+    return evaluate(request, sky, hidden=False, share=True)

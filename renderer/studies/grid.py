@@ -14,8 +14,9 @@ from renderer.arguments.up import up_axis
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.queryable import Queries
+from renderer.rayscene.scene import RayScene
 from renderer.studies.places import FacePoints
-from renderer.studies.share import expect_octree
+from renderer.studies.share import octree_of
 
 Floats = NDArray[np.float64]
 
@@ -24,7 +25,7 @@ _MOST = 1 << 28
 
 
 def grid_points(
-    octree: Queries,
+    octree: Queries | RayScene,
     spacing: float,
     *,
     bounds: ArrayLike | None = None,
@@ -35,7 +36,8 @@ def grid_points(
 
     Parameters
     ----------
-    octree : Octree or BruteForce
+    octree : Octree, BruteForce or RayScene
+        Of a scene faces are those of its ``merged`` mesh, as for `occlusion`.
     spacing : float
         The distance between neighbours, > 0, in scene units.
     bounds : array_like, shape (2, 3), optional
@@ -77,7 +79,7 @@ def grid_points(
     >>> sky_view_factor(octree, street.points, street.normals).round(2)
     array([0.73, 0.89])
     """
-    expect_octree(octree)
+    octree = octree_of(octree)
     axis = up_axis(up)
     level = [a for a in range(3) if a != axis]
     lower, upper = octree.mesh.bounds if bounds is None else _region(bounds)

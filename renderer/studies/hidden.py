@@ -11,6 +11,7 @@ from renderer.arguments.arrays import flag_argument
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.queryable import Queries
+from renderer.rayscene.scene import RayScene
 from renderer.studies.share import (
     check_directions,
     check_reach,
@@ -25,7 +26,7 @@ from renderer.studies.sweep import Sky
 
 @overload
 def occlusion(
-    octree: Queries,
+    octree: Queries | RayScene,
     points: ArrayLike,
     normals: ArrayLike | None,
     directions: ArrayLike,
@@ -42,7 +43,7 @@ def occlusion(
 
 @overload
 def occlusion(
-    octree: Queries,
+    octree: Queries | RayScene,
     points: ArrayLike,
     normals: ArrayLike | None,
     directions: ArrayLike,
@@ -59,7 +60,7 @@ def occlusion(
 
 @overload
 def occlusion(
-    octree: Queries,
+    octree: Queries | RayScene,
     points: ArrayLike,
     normals: ArrayLike | None,
     directions: ArrayLike,
@@ -75,7 +76,7 @@ def occlusion(
 
 
 def occlusion(
-    octree: Queries,
+    octree: Queries | RayScene,
     points: ArrayLike,
     normals: ArrayLike | None,
     directions: ArrayLike,
@@ -95,7 +96,8 @@ def occlusion(
 
     Parameters
     ----------
-    octree : Octree or BruteForce
+    octree : Octree, BruteForce or RayScene
+        A scene is searched as its ``merged`` mesh, whose memory grows with the copies.
     points : array_like, shape (..., 3)
         Finite; on the surface or not.
     normals : array_like, shape (..., 3) or (3,), or None
@@ -161,7 +163,7 @@ def occlusion(
     limits = limits_of(check_reach(max_distance, distance), directions)
     if flag_argument("packed", packed):
         expect(weights is None, "weights", "None, as bits have none", "an array")
-        return evaluate_bits(octree, request, Sky(directions, np.ones(len(directions)), limits, False, False))
+        return evaluate_bits(request, Sky(directions, np.ones(len(directions)), limits, False, False))
     values = check_weights("weights", weights, len(directions))
     expect(bool(values.any()), "weights", "one that is not 0", "all 0")
-    return evaluate(octree, request, Sky(directions, values, limits, False, False), hidden=True, share=True)
+    return evaluate(request, Sky(directions, values, limits, False, False), hidden=True, share=True)

@@ -16,6 +16,9 @@ from renderer.distance.on_surface import check_on, on_surface
 from renderer.errors import expect
 from renderer.ordering.morton import order_along_curve
 from renderer.queryable import Queries
+from renderer.rayscene.built import BuiltScene
+from renderer.rayscene.queries import SceneQueries
+from renderer.rayscene.scene import RayScene
 from renderer.studies.density import are_dense
 from renderer.studies.sweep import TILE, Answers, Places, Sky, make_sweep_scratch, sweep
 from renderer.system.terminal import progress_bar
@@ -24,6 +27,8 @@ from renderer.trace.batch import check_faces
 
 Floats = NDArray[np.float64]
 
+# Rays that are written down together: a tenth of a second of tracing, some dozens of megabytes.
+ROWS = 1 << 18
 # Points that are sorted together: 16 bytes each, and a second of work.
 _BLOCK = 1 << 22
 # The points of a chunk: at most, and at least if there are enough for all threads.
@@ -31,21 +36,41 @@ _MOST, _LEAST = 64 * TILE, 16
 
 
 class StudyRequest(NamedTuple):
-    """The points of a study (n, 3), their shape as given, and how it runs."""
+    """What a study searches, its points (n, 3), their shape as given, and how it runs."""
 
+    octree: Queries
     places: Places
     shape: tuple[int, ...]
     threads: int
     progress: bool
 
 
-def expect_octree(octree: object) -> None:
-    """Raise ``ValueError`` for what takes no queries."""
-    expect(isinstance(octree, Queries), "octree", "an Octree or a BruteForce", type(octree).__name__)
+class Snapshot(SceneQueries):
+    """A scene at one moment: all rays of a study see the same, whatever moves meanwhile."""
+
+    def __init__(self, scene: RayScene) -> None:
+        self.threads, self._at = scene.threads, scene._built
+
+    @property
+    def _built(self) -> BuiltScene:
+        return self._at
+
+
+def snapshot_of(octree: Queries | RayScene) -> Queries | Snapshot:
+    """What traces the rays of a study. Raises ``ValueError`` for what takes no queries."""
+    good = isinstance(octree, Queries | RayScene)
+    expect(good, "octree", "an Octree, a BruteForce or a RayScene", type(octree).__name__)
+    return Snapshot(octree) if isinstance(octree, RayScene) else octree
+
+
+def octree_of(octree: Queries | RayScene) -> Queries:
+    """The octree of a study, which for a scene is that of its merged mesh. Raises as ``snapshot_of``."""
+    found = snapshot_of(octree)
+    return found if isinstance(found, Queries) else found._built.merged
 
 
 def check_request(
-    octree: Queries,
+    octree: Queries | RayScene,
     points: ArrayLike,
     normals: ArrayLike | None,
     leaving: ArrayLike | None,
@@ -53,13 +78,13 @@ def check_request(
     progress: bool,
 ) -> StudyRequest:
     """Check the arguments that all studies have."""
-    expect_octree(octree)
+    octree = octree_of(octree)
     rows, shape = check_points("points", points, farthest_of(octree.tree.scale))
     faces = check_faces("leaving", -1 if leaving is None else leaving, shape, len(octree.mesh.faces))
     check_on(octree.mesh, "points", rows, faces)
     workers = octree.threads if threads is None else checked_threads(threads)
     places = Places(rows, _check_normals(normals, shape), faces, np.empty(0, np.int64), np.empty((0, 3)))
-    return StudyRequest(places, shape, workers, flag_argument("progress", progress))
+    return StudyRequest(octree, places, shape, workers, flag_argument("progress", progress))
 
 
 def _check_normals(normals: ArrayLike | None, shape: tuple[int, ...]) -> Floats:
@@ -123,24 +148,24 @@ def limits_of(distance: float, directions: Floats) -> Floats:
     return distance / lengths_of(directions)
 
 
-def evaluate(octree: Queries, request: StudyRequest, sky: Sky, *, hidden: bool, share: bool) -> Floats:
+def evaluate(request: StudyRequest, sky: Sky, *, hidden: bool, share: bool) -> Floats:
     """The sums over the hidden or open directions of each point, or their shares; see ``Answers``."""
     sums = np.empty(len(request.places.points))
-    run(octree, request, sky, Answers(sums, np.empty((0, 1), np.uint8), hidden, share))
+    run(request, sky, Answers(sums, np.empty((0, 1), np.uint8), hidden, share))
     return sums.reshape(request.shape)
 
 
-def evaluate_bits(octree: Queries, request: StudyRequest, sky: Sky) -> NDArray[np.uint8]:
+def evaluate_bits(request: StudyRequest, sky: Sky) -> NDArray[np.uint8]:
     """For each point a set bit for each hidden direction."""
     width = -(-len(sky.directions) // 8)
     bits = np.zeros((len(request.places.points), width), np.uint8)
-    run(octree, request, sky, Answers(np.empty(0), bits, True, False))
+    run(request, sky, Answers(np.empty(0), bits, True, False))
     return bits.reshape(*request.shape, width)
 
 
-def run(octree: Queries, request: StudyRequest, sky: Sky, answers: Answers) -> None:
+def run(request: StudyRequest, sky: Sky, answers: Answers) -> None:
     """Trace all points in all directions on threads, in the order of a curve, and write to ``answers``."""
-    mesh, tree = octree._built
+    mesh, tree = request.octree._built
     count = len(request.places.points)
     faces, codes, anchors = on_surface(tree, mesh, request.places.points, request.places.leaving, request.threads)
     places = request.places._replace(leaving=faces, codes=codes, anchors=anchors)

@@ -11,6 +11,7 @@ from renderer.arguments.counts import count_argument
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.queryable import Queries
+from renderer.rayscene.scene import RayScene
 from renderer.studies.directions import MOST, Pattern, fibonacci_hemisphere, reinhart, tregenza, turned
 from renderer.studies.pole import pole_of
 from renderer.studies.share import (
@@ -30,7 +31,7 @@ _DEFINITIONS = ("cosine", "geometric")
 
 
 def sky_view_factor(
-    octree: Queries,
+    octree: Queries | RayScene,
     points: ArrayLike,
     normals: ArrayLike | None = None,
     *,
@@ -50,7 +51,7 @@ def sky_view_factor(
 
     Parameters
     ----------
-    octree : Octree or BruteForce
+    octree : Octree, BruteForce or RayScene
     points : array_like, shape (..., 3)
     normals : array_like, shape (..., 3) or (3,), optional
         As for `occlusion`. By default `up`, the normal of level ground.
@@ -110,11 +111,11 @@ def sky_view_factor(
     cosine = definition == "cosine"
     values = pattern.weights / lengths_of(directions) if cosine else pattern.weights
     sky = Sky(directions, values, limits_of(check_reach(max_distance, distance), directions), False, cosine)
-    return evaluate(octree, request, sky, hidden=False, share=True)
+    return evaluate(request, sky, hidden=False, share=True)
 
 
 def sun_hours(
-    octree: Queries,
+    octree: Queries | RayScene,
     points: ArrayLike,
     normals: ArrayLike | None,
     sun_directions: ArrayLike,
@@ -133,7 +134,7 @@ def sun_hours(
 
     Parameters
     ----------
-    octree : Octree or BruteForce
+    octree : Octree, BruteForce or RayScene
     points : array_like, shape (..., 3)
     normals : array_like, shape (..., 3) or (3,), or None
         As for `occlusion`.
@@ -184,7 +185,7 @@ def sun_hours(
             return np.zeros(request.shape)
         suns, hours = suns[day], hours[day]
     sky = Sky(suns, hours, limits_of(reach, suns), False, False)
-    return evaluate(octree, request, sky, hidden=False, share=False)
+    return evaluate(request, sky, hidden=False, share=False)
 
 
 def _expect_definition(definition: str) -> None:

@@ -29,8 +29,8 @@ class RayMeshIntersector:
 
     Parameters
     ----------
-    geometry : trimesh.Trimesh
-        The mesh. The tree is built by the first query, and again after an edit.
+    geometry : trimesh.Trimesh or RayScene
+        The mesh, of a scene the ``merged`` one. The tree is built by the first query, and again after an edit.
     scale_to_box : bool, default True
         Ignored; nothing is scaled.
 
@@ -201,10 +201,10 @@ class RayMeshIntersector:
         ndarray of bool, shape (n,)
             True on the surface; False for a point that is not finite.
         """
-        given = as_rows("points", points)
-        if len(self.mesh.faces) == 0:
+        given, it = as_rows("points", points), traced(self.mesh)
+        if len(it.faces) == 0:
             return np.zeros(len(given), np.bool_)
-        return points_within(traced(self.mesh), given)
+        return points_within(it, given)
 
     def __copy__(self, *memo: Any) -> "RayMeshIntersector":
         """Of the same mesh, as trimesh's own."""

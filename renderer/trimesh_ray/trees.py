@@ -89,7 +89,11 @@ _by_digest: "weakref.WeakValueDictionary[int, Traced]" = weakref.WeakValueDictio
 
 
 def traced(mesh: Any) -> Traced:
-    """The octree of a mesh as it is now: built when first asked for, and again after an edit."""
+    """The octree of a mesh, or of a scene's merged one, as it is now: built by the first query, again after an edit."""
+    # Late, as above.
+    from renderer.rayscene.scene import RayScene
+
+    mesh = mesh.merged if isinstance(mesh, RayScene) else mesh
     key, digest = id(mesh), hash(mesh)
     kept = _kept.get(key)
     if kept is not None and kept.digest == digest and kept.mesh() is mesh:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from cases import cases
 
-from renderer import Mesh, Octree
+from renderer import Mesh, Octree, RayScene
 from renderer.checkpoints.study import run
 from renderer.cluster import Study, any_hit, closest_hit, connected, run_on
 from renderer.studies import face_points
@@ -43,6 +43,20 @@ def test_a_study_on_workers_has_the_bits_of_one_process(client: Any, octree: Oct
     assert study.evaluate(octree, places).tobytes() == expected.tobytes()
     other = run_on(client, octree, study, places, tmp_path / "other", size=SIZE * 4, split="sah")
     assert 1 < other.plan.parts < there.plan.parts and other.joined().tobytes() == expected.tobytes()
+
+
+def test_a_scene_goes_to_workers_as_its_merged_mesh(client: Any, octree: Octree, tmp_path: Path) -> None:
+    scene = RayScene()
+    scene.add(octree, [[[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 0]] for x in (0.0, 500.0)])
+    points, study, whole = face_points(scene.merged), Study("ao", {"samples": 20}), Octree(scene.merged)
+    there = run_on(client, scene, study, points, tmp_path / "parts", size=SIZE * 8)
+    assert there.joined().tobytes() == study.evaluate(whole, points).tobytes()
+    assert study.evaluate(scene, points).tobytes() == there.joined().tobytes()
+    origins, down = points.points[::40] + np.array([0.1, 0.2, 200.0]), np.array([0.0, 0.0, -1.0])
+    rays = da.from_array(origins, 50), da.from_array(np.tile(down, (len(origins), 1)), 50)
+    expected = whole.closest_hit(origins, down)
+    assert closest_hit(scene, *rays)["face"].compute(scheduler=client).tobytes() == expected.face.tobytes()
+    assert (any_hit(scene, *rays).compute(scheduler=client) == expected.hit).all()
 
 
 def test_hits_of_dask_arrays_stay_lazy_and_keep_chunks(client: Any, octree: Octree) -> None:

@@ -83,6 +83,7 @@ IN_SHORT: dict[str, tuple[dict[str, str], str]] = {
     "python -m validation.benchmark.measures.cluster": ({}, "--mesh city_2000 --rounds 1"),
     "python tests/fuzz --inputs 100000": ({"100000": "20"}, ""),
     "python scenes/make_quarter.py": ({}, "--buildings 40"),
+    "python scenes/make_car_park.py": ({}, "--frames 2"),
 }
 # Commands that another file runs, by how they begin.
 RUN_ELSEWHERE = {

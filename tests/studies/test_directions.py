@@ -18,7 +18,7 @@ pytestmark = pytest.mark.judges(
 )  # fmt: skip
 
 
-MODULES = ["ambient", "directions", "grid", "hidden", "places", "sky", "views"]
+MODULES = ["ambient", "directions", "grid", "hidden", "places", "scanner", "sky", "views"]
 
 
 @cases("name", MODULES)

@@ -80,7 +80,7 @@ class TestGridPoints:
             ({"spacing": 1, "bounds": [0, 0, 0]}, r"bounds: expected shape \(2, 3\), got shape \(3,\)"),
             ({"spacing": 1, "bounds": [[0, 0, 0], [1, -1, 0]]}, "bounds: expected the least corner, then the greatest"),
             ({"spacing": 1, "up": "w"}, "up: expected 'x', 'y' or 'z', got 'w'"),
-            ({"spacing": 1, "octree": box()}, "octree: expected an Octree or a BruteForce, got Mesh"),
+            ({"spacing": 1, "octree": box()}, "octree: expected an Octree, a BruteForce or a RayScene, got Mesh"),
         ],
     )
     def test_bad_arguments_are_named(self, given, said):

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from twins import CORNERS, MESH, NORMALS, Floats, meetings
 
 from renderer import BruteForce, Mesh, Octree, OrthographicCamera, PerspectiveCamera
-from renderer.studies import Pattern, depth_map, fibonacci_sphere, scan, views, visible_faces
+from renderer.studies import Pattern, depth_map, fibonacci_sphere, scan, scanner, views, visible_faces
 
 TARGETS = {"octree": Octree.from_mesh(MESH, threads=1), "brute force": BruteForce.from_mesh(MESH, threads=2)}
 targets = st.sampled_from(sorted(TARGETS)).map(TARGETS.__getitem__)
@@ -57,7 +57,7 @@ def test_a_scan_is_that_of_its_slow_twin(
     if kind == "number":
         ways = fibonacci_sphere(60).directions
     given: Any = {"number": np.int64(60), "pattern": Pattern(ways, np.ones(60)), "array": FORMS[form](ways)}[kind]
-    with patch.object(views, "_ROWS", together):
+    with patch.object(scanner, "_ROWS", together):
         cloud = scan(target, FORMS[form](place), given, max_distance=distance)
     face, away = first_hits(np.broadcast_to(place, ways.shape), ways)
     rays = np.flatnonzero((face >= 0) & (away <= distance))

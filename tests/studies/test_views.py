@@ -17,6 +17,7 @@ from renderer.studies import (
     fibonacci_sphere,
     reinhart,
     scan,
+    scanner,
     sky_view_factor,
     views,
     visible_faces,
@@ -88,6 +89,7 @@ def test_faces_without_area_are_not_seen_and_blocks_change_nothing(monkeypatch):
     assert not seen[-1] and 0.2 < seen.mean() < 0.8
     depth, cloud = depth_map(octree, CAMERAS[0], 31, 23), scan(octree, [0, 3, 0.5], 5000)
     monkeypatch.setattr(views, "_ROWS", 100)
+    monkeypatch.setattr(scanner, "_ROWS", 100)
     np.testing.assert_array_equal(visible_faces(octree, [0.0, 3.0, 0.5], cuts=2), seen)
     np.testing.assert_array_equal(depth_map(octree, CAMERAS[0], 31, 23), depth)
     for ours, theirs in zip(scan(octree, [0, 3, 0.5], 5000), cloud, strict=True):

@@ -10,10 +10,10 @@ from validation.defects.edits import argument, call, choice, compare, value
 from validation.defects.seeded.defect import Defect
 
 
-def _first_direction_open(sound: Any, octree: Any, request: Any, sky: Any, answers: Any) -> Any:
+def _first_direction_open(sound: Any, request: Any, sky: Any, answers: Any) -> Any:
     limits = np.array(sky.limits)
     limits[:1] = 0.0
-    return sound(octree, request, sky._replace(limits=limits), answers)
+    return sound(request, sky._replace(limits=limits), answers)
 
 
 def _mirrored_bytes(bits: Any) -> Any:
@@ -50,7 +50,7 @@ _CHANGES: dict[str, Change] = {
     "distances in units of the directions": Wrapped("share.limits_of", _limits_in_directions),
     "every sun stands for an hour": Wrapped("sky.check_weights", _hours_alike),
     "a scan's distances in units of its directions": Wrapped(
-        "views.lengths_of", lambda sound, directions: np.ones(len(directions))
+        "scanner.lengths_of", lambda sound, directions: np.ones(len(directions))
     ),
     "an eye sees faces by their middles, near or hidden": Rule("faces-in-view", value("np.ones_like(_)")),
     "at a corner the other side of the normal's region is taken": Rule("side-of-normal", compare("<")),
