@@ -46,7 +46,7 @@ class Scan:
         From the scanner, in scene units.
     faces : ndarray of int64, shape (m,)
     rays : ndarray of int64, shape (m,)
-        The row of each ray in the directions of the scanner.
+        The row of each ray in the directions or poses of the scanner.
     cosines : ndarray of float64, shape (m,)
         The cosine of the angle between ray and normal, from 0 to 1, on either side of the face.
     returns : ndarray of int64, shape (m,)
