@@ -274,6 +274,11 @@ class BuiltScene:
         for_chunks(find, len(flat), _CHUNK, self.threads)
         return Located(*(row.reshape(faces.shape) for row in (*located, *swapped)))
 
+    def instances_of(self, faces: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The instances among all, from 0, of faces of the scene (k,); some one for -1."""
+        first = self.top.instances.view(np.int64)[:, FIRST_FACE]
+        return np.maximum(np.searchsorted(first, faces, side="right") - 1, 0)
+
     def corners(self, faces: NDArray[np.int64]) -> NDArray[np.float64]:
         """The placed corners of faces of the scene, (k, 3, 3)."""
         corners = np.empty((len(faces), 3, 3))

@@ -14,7 +14,8 @@ from renderer.rayscene.built import BuiltScene
 from renderer.rayscene.hits import SceneHits
 from renderer.results.hits import Hits, Passage
 from renderer.trace.batch import NO_STARTS, RayBatch, check_rays, offset_origins, whole_numbers
-from renderer.trace.instances import MASK_BITS
+from renderer.trace.batch import Leaving as StartsOn
+from renderer.trace.instances import FLAGS, MASK_BITS
 from renderer.trace.leaving import check_leaving, shapes_of_starts
 from renderer.trace.starts.record import ALL, FACE, HEAD, IGNORED, MASK, ROW, ROW_STEP
 
@@ -43,7 +44,9 @@ def rays_of(
     rays, shape = check_rays(origins, directions, t_min, t_max, shapes)
     count, masks = rays.number, _masks(mask, shape)
     if leaving is not None:
-        rays = _leave(scene, rays, leaving, shape)
+        rays = _leave(
+            scene, rays, _seen_of(scene, check_leaving(leaving, None, shape, scene.count), masks, ignored, shape)
+        )
     elif ignored is not None or (masks != ALL).any():
         rows = count if ignored is not None or len(masks) > 1 else 1
         starts = np.zeros(HEAD + ROW * rows, np.int64)
@@ -93,9 +96,26 @@ def _ignored(scene: BuiltScene, ignore: SceneHits | None) -> NDArray[np.float64]
     return ignored
 
 
-def _leave(scene: BuiltScene, rays: RayBatch, leaving: Hits | Passage, shape: tuple[int, ...]) -> RayBatch:
+def _seen_of(
+    scene: BuiltScene,
+    left: StartsOn,
+    masks: NDArray[np.float64],
+    ignored: NDArray[np.float64] | None,
+    shape: tuple[int, ...],
+) -> StartsOn:
+    """``left`` without the faces of instances that the rays do not see, and start on as on nothing."""
+    if ignored is None and (masks == ALL).all():
+        return left
+    number = scene.instances_of(left.faces) + 1
+    flags = scene.top.instances.view(np.int64)[number - 1, FLAGS]
+    unseen = (masks.astype(np.int64) & flags & MASK_BITS) == 0
+    if ignored is not None:
+        unseen |= np.broadcast_to(ignored, shape).reshape(-1) == number
+    return left._replace(faces=np.where(unseen, -1, left.faces))
+
+
+def _leave(scene: BuiltScene, rays: RayBatch, left: StartsOn) -> RayBatch:
     """The rays moved off the faces that they leave."""
-    left = check_leaving(leaving, None, shape, scene.count)
     leaves = left.faces >= 0
     corners = scene.corners(left.faces[leaves])
     # The faces that rays leave as a mesh of their own; the kernels look up all others in the scene.

@@ -49,6 +49,12 @@ def admits_all(tree, w, dz):
 
 
 @inlined
+def may_hit_all(tree, block, mask, ignored):
+    """``Ways.may_hit`` of a mesh."""
+    return True
+
+
+@inlined
 def side_of(w, dz):
     """The side of a face that a ray came from, 1 that of the normal, -1 the other: by the sign of a hit's w and that of
     the ray's ``Shear.direction_z``.

@@ -129,6 +129,12 @@ class ScenePointers(NamedTuple):
 
 
 @inlined
+def _may_hit(tree, block, mask, ignored):
+    number = block >> NUMBER_BITS
+    return _meets(_instance(tree, number)[1], number, mask, ignored)
+
+
+@inlined
 def _admits(tree, w, dz):
     # rule: facing
     return tree.facing == 0 or (tree.facing == 1) == (side_of(w, dz) > 0)
@@ -459,7 +465,7 @@ def _resume(tree, rays, prepared, lanes, r):
             store(integers, _NODES_AT + r, tree.top)
             continue
         if number == 0 and child < 0:
-            if not _may_hit(tree, prepared, r, ~child + 1):
+            if not _may_enter(tree, prepared, r, ~child + 1):
                 continue
             number = ~child + 1
             store(lanes.stacks, top, _LEFT)
@@ -478,7 +484,7 @@ def _resume(tree, rays, prepared, lanes, r):
 
 
 @inlined
-def _may_hit(tree, prepared, r, number):
+def _may_enter(tree, prepared, r, number):
     _, words = _instance(tree, number)
     return _meets(words, number, load(prepared.integers, _MASK + r), load(prepared.integers, _IGNORED + r))
 
@@ -518,6 +524,6 @@ def scene_pointers(descriptor):
         np.int64(load(at, INSTANCE_COUNT)), np.int64(load(at, FACING)), local_floats(), np.int64(0), True, 1.0,
         Ways(
             _corners, _coordinate, _face, _corners_of_face, _child, _boxes, _enter, _begin, _node_of, _resume,
-            _admits, _trace_packet,
+            _may_hit, _admits, _trace_packet,
         ),
     )  # fmt: skip

@@ -8,7 +8,7 @@ from numba.extending import intrinsic
 
 from renderer.jit.decorators import inlined
 from renderer.numerics.simd import double_of, float32_pointer, float64_pointer, int32_pointer, load, pointer
-from renderer.trace.best import admits_all
+from renderer.trace.best import admits_all, may_hit_all
 from renderer.trace.edge_signs import coordinate_of_block
 from renderer.trace.instances import scene_pointers
 from renderer.trace.intersect import corners_of_block, face_of_block
@@ -55,7 +55,7 @@ def _mesh_pointers(descriptor):
         double_of(load(at, SCALE)),
         Ways(
             corners_of_block, coordinate_of_block, face_of_block, corners_of_mesh, child_of_node, boxes_of_node,
-            enter_node_of_tree, begin_in_tree, node_in_tree, resume_in_tree, admits_all, trace_packet,
+            enter_node_of_tree, begin_in_tree, node_in_tree, resume_in_tree, may_hit_all, admits_all, trace_packet,
         ),
     )  # fmt: skip
 

@@ -414,3 +414,28 @@ def test_values_of_one_object_are_not_taken_for_those_of_others():
 def test_a_mesh_that_cannot_be_used_is_refused():
     with pytest.raises(MeshError):
         RayScene().add([[0, 0, 0]])
+
+
+@cases("repeats", [1, 10])
+def test_what_a_ray_does_not_see_is_not_there_where_it_starts(repeats):
+    """Two sheets share an edge; a cube stands on a plate."""
+    scene = RayScene()
+    sheet = Mesh([[-1, -1, 0], [0, -1, 0], [0, 1, 0], [-1, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    wall = Mesh([[0, -1, 0], [0, -1, 2], [0, 1, 2], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    scene.add(sheet, mask=1)
+    scene.add(wall, mask=2)
+    down = np.repeat([[0.0, 0.0, -1.0]], repeats, axis=0)
+    edge = scene.closest_hit(np.repeat([[0.0, 0.3, 1.0]], repeats, axis=0), down, mask=1)
+    across = [1.0, 0.0, 1.0]
+    assert (scene.closest_hit(edge.points, across, leaving=edge).t == 0).all()
+    assert not scene.any_hit(edge.points, across, leaving=edge, mask=1).any()
+
+    scene = RayScene()
+    plate = scene.add(box((-9, -9, -1), (9, 9, 0)))
+    cube = scene.add(box())
+    roof = scene.closest_hit(np.repeat([[0.3, 0.4, 9.0]], repeats, axis=0), down)
+    assert (roof.object == cube).all()
+    # Into its own body, which it does not see, down to the plate.
+    below = scene.closest_hit(roof.points, down, leaving=roof, ignore=roof)
+    assert (below.object == plate).all() and (below.t == 1).all()
+    assert (scene.closest_hit(roof.points, down, leaving=roof).t == 0).all()

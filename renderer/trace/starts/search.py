@@ -43,6 +43,7 @@ from renderer.trace.starts.meeting import (
 )
 from renderer.trace.starts.record import (
     ABOVE,
+    ALL,
     ANCHOR,
     BACK,
     BARYCENTRIC,
@@ -84,7 +85,8 @@ def _box_holds(tree, place, o):
 
 class _Surroundings(NamedTuple):
     """The search for faces around a start: the anchor, also as rounded; the box around it; for a ray that leaves it the
-    direction and the last two arguments of ``meet_face``; and the list of faces that contain the anchor.
+    direction and the last two arguments of ``meet_face``; the list of faces that contain the anchor; and mask and
+    instance ignored, as of ``intersect.Ray``.
     """
 
     anchor: Any
@@ -95,15 +97,19 @@ class _Surroundings(NamedTuple):
     slope: int
     dz: float
     holders: Any
+    mask: float
+    ignored: float
 
 
 @kernel
-def list_holders(tree, anchor, d, slope, dz, stack, holders):
-    """List the faces that contain an anchor from which a ray leaves in direction d. Returns their number."""
+def list_holders(tree, anchor, d, slope, dz, stack, holders, mask, ignored):
+    """List the faces that contain an anchor from which a ray leaves in direction d, and that it may hit. Returns their
+    number.
+    """
     o = rounded(anchor)
     room = largest_component(o) * _ROOM
     low, high = sub(o, (room, room, room)), add(o, (room, room, room))
-    query = _Surroundings(anchor, o, low, high, d, slope, dz, holders)
+    query = _Surroundings(anchor, o, low, high, d, slope, dz, holders, mask, ignored)
     return walk(tree, stack, query, np.int64(0), _enter_around, _add_holders)
 
 
@@ -115,6 +121,9 @@ def _enter_around(tree, query, node, count):
 @kernel
 def _add_holders(tree, query, first, blocks, count):
     """List the faces of some blocks that contain an anchor."""
+    # rule: holders-of-mask
+    if not tree.ways.may_hit(tree, first, query.mask, query.ignored):
+        return count, False
     for block in range(first, first + blocks):
         for i in range(BLOCK_FACES):
             face, place = face_in(tree, block * BLOCK_FACES + i), block * BLOCK_WORDS + i
@@ -169,7 +178,7 @@ def depart(tree, starts, i, ray, stack, memory):
     stopped, slope, count = no_hit(np.inf), slope_there(anchor, d), 0
     if start.code & KNOWN != 0 and ray.t_min == 0.0:
         dz, holders = make_shear(ray).direction_z, make_holders(memory)
-        count = list_holders(tree, anchor, d, slope, dz, stack, holders)
+        count = list_holders(tree, anchor, d, slope, dz, stack, holders, ray.mask, ray.ignored)
         # rule: side-of-start
         behind = Behind(
             start.face, 1 if start.code & ABOVE != 0 else -1, start.code & THROUGH != 0, np.int64(start.anchor[2]),
@@ -302,7 +311,7 @@ def take_side(tree, starts, n, stack, memory, table, room):
     start, holders = start_at(tree, starts, 0), make_holders(memory)
     anchor, (d, _) = anchor_of(start), unit_direction(n)
     slope = slope_there(anchor, d)
-    count = list_holders(tree, anchor, d, slope, 1.0, stack, holders)
+    count = list_holders(tree, anchor, d, slope, 1.0, stack, holders, ALL, -1.0)
     arcs, number, nodes = arcs_of(tree, anchor, holders, count)
     k, side = bounding_holder(tree, anchor, arcs, number, nodes, d, start.face)
     clear_fan(table)
