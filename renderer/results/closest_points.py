@@ -5,16 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
-from renderer.mesh.parts import part_numbers
-from renderer.mesh.values import Owner, interpolated
+from renderer.results.attributes import Attributes
 from renderer.results.hits import points_on
 
 
 @dataclass(eq=False, slots=True)
-class ClosestPoints:
+class ClosestPoints(Attributes):
     """The nearest point of a mesh to each of some points. The shape (...) is that of the points.
 
     Attributes
@@ -69,39 +68,3 @@ class ClosestPoints:
         points, found = np.full((*self.face.shape, 3), np.nan), self.found
         points[found] = points_on(self._mesh, self.face[found], self.u[found], self.v[found])
         return points
-
-    @property
-    def part(self) -> NDArray[np.int64]:
-        """The part that has the nearest point, as an index of ``octree.mesh.parts``, (...) int64; -1 if there is none.
-
-        Examples
-        --------
-        >>> from renderer import Mesh, Octree
-        >>> from renderer.mesh.shapes import box
-        >>> octree = Octree(Mesh.concatenate(box(), box((3, 0, 0), (4, 1, 1))))
-        >>> octree.closest_point([[0.5, 0.25, 3], [5, 0.5, 0.5]]).part
-        array([0, 1])
-        """
-        return part_numbers(self._mesh.parts, self.face)
-
-    def interpolate(self, values: ArrayLike, *, on: Owner | None = None) -> NDArray[np.float64]:
-        """Return values of the mesh at the nearest points, as ``Hits.interpolate`` does; nan if there is none.
-
-        Parameters
-        ----------
-        values, on
-            As for ``Hits.interpolate``.
-
-        Returns
-        -------
-        ndarray of float64, shape (..., ...)
-
-        Examples
-        --------
-        >>> from renderer import Octree
-        >>> from renderer.mesh.shapes import box
-        >>> octree = Octree(box())
-        >>> octree.closest_point([0.5, 0.25, 3]).interpolate(octree.mesh.vertices)
-        array([0.5 , 0.25, 1.  ])
-        """
-        return interpolated(self._mesh, self.face, self.u, self.v, values, on)

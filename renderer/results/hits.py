@@ -6,11 +6,10 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh, face_normals
-from renderer.mesh.parts import part_numbers
-from renderer.mesh.values import Owner, interpolated
+from renderer.results.attributes import Attributes
 
 
 class Passage(NamedTuple):
@@ -37,7 +36,7 @@ class Passage(NamedTuple):
 
 # Slots and not frozen: a call with one ray spends a third of its time on making objects.
 @dataclass(eq=False, slots=True)
-class Hits:
+class Hits(Attributes):
     """Closest hits. Their shape (...) is that of the rays.
 
     Attributes
@@ -167,56 +166,9 @@ class Hits:
         normals[hit] = _normals(self._mesh, self.face[hit])
         return normals
 
-    @property
-    def part(self) -> NDArray[np.int64]:
-        """The part that each ray hit, as an index of ``octree.mesh.parts``, (...) int64; -1 on a miss.
-
-        Examples
-        --------
-        >>> from renderer import Mesh, Octree
-        >>> from renderer.mesh.shapes import box
-        >>> octree = Octree(Mesh.concatenate(box(), box((3, 0, 0), (4, 1, 1))))
-        >>> octree.closest_hit([[0.5, 0.25, 3], [3.5, 0.25, 3], [5, 5, 5]], [0, 0, -1]).part
-        array([ 0,  1, -1])
-        """
-        return part_numbers(self._mesh.parts, self.face)
-
-    def interpolate(self, values: ArrayLike, *, on: Owner | None = None) -> NDArray[np.float64]:
-        """Return values of the mesh at the hits: interpolated between vertices, or those of the faces.
-
-        Parameters
-        ----------
-        values : array_like, shape (V, ...) or (F, ...)
-            A number or a row of numbers for each vertex or each face of the mesh, such as ``mesh.colors``.
-        on : {"vertices", "faces"}, optional
-            What the values belong to. Needed only if the mesh has as many vertices as faces.
-
-        Returns
-        -------
-        ndarray of float64, shape (..., ...)
-            The shape of the hits, then that of a row; nan on a miss.
-
-        Raises
-        ------
-        ValueError
-            If the number of rows is neither that of the vertices nor that of the faces.
-
-        Examples
-        --------
-        >>> from renderer import Octree
-        >>> from renderer.mesh.shapes import box
-        >>> octree = Octree(box())
-        >>> hits = octree.closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1])
-        >>> hits.interpolate(octree.mesh.vertices[:, 0])
-        array([0.5, nan])
-        >>> hits.interpolate(range(12))
-        array([10., nan])
-        """
-        return interpolated(self._mesh, self.face, self.u, self.v, values, on)
-
 
 @dataclass(eq=False, slots=True)
-class AllHits:
+class AllHits(Attributes):
     """All hits of n rays, m in all, in compressed rows: those of ray i are the rows offsets[i] to offsets[i + 1].
 
     The hits of a ray are sorted by t, then by face.
@@ -309,42 +261,6 @@ class AllHits:
                [ 0.,  0., -1.]])
         """
         return _normals(self._mesh, self.face)
-
-    @property
-    def part(self) -> NDArray[np.int64]:
-        """The part of each hit, as an index of ``octree.mesh.parts``, (m,) int64.
-
-        Examples
-        --------
-        >>> from renderer import Mesh, Octree
-        >>> from renderer.mesh.shapes import box
-        >>> octree = Octree(Mesh.concatenate(box(), box((0, 0, 2), (1, 1, 3))))
-        >>> octree.all_hits([0.5, 0.25, 5], [0, 0, -1]).part
-        array([1, 1, 0, 0])
-        """
-        return part_numbers(self._mesh.parts, self.face)
-
-    def interpolate(self, values: ArrayLike, *, on: Owner | None = None) -> NDArray[np.float64]:
-        """Return values of the mesh at the hits, as ``Hits.interpolate`` does.
-
-        Parameters
-        ----------
-        values, on
-            As for ``Hits.interpolate``.
-
-        Returns
-        -------
-        ndarray of float64, shape (m, ...)
-
-        Examples
-        --------
-        >>> from renderer import Octree
-        >>> from renderer.mesh.shapes import box
-        >>> octree = Octree(box())
-        >>> octree.all_hits([0.5, 0.25, 3], [0, 0, -1]).interpolate(octree.mesh.vertices[:, 2])
-        array([1., 0.])
-        """
-        return interpolated(self._mesh, self.face, self.u, self.v, values, on)
 
 
 def points_on(
