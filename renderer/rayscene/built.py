@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
+from uuid import uuid4
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +40,17 @@ from renderer.trace.instances import (
     TOP_NODES,
     VERTICES,
 )
-from renderer.trace.layout import BLOCK_WORDS, CHILDREN, LEAF_BITS, NODE_WORDS, TREE_WORDS, UNUSED, Tree, cache_aligned
+from renderer.trace.layout import (
+    BLOCK_FACES,
+    BLOCK_WORDS,
+    CHILDREN,
+    LEAF_BITS,
+    NODE_WORDS,
+    TREE_WORDS,
+    UNUSED,
+    Tree,
+    cache_aligned,
+)
 from renderer.tree.build import SPLITS, build_nodes, new_faces
 from renderer.tree.hierarchy import Rule
 
@@ -52,6 +63,10 @@ _MOST_BLOCKS = (1 << NUMBER_BITS) // BLOCK_WORDS
 # Faces that are looked for together: a tenth of a millisecond.
 _CHUNK = 4096
 _RULE = Rule(SPLITS["midpoint"], 1, 32)
+
+
+def _new_id() -> str:
+    return uuid4().hex
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,20 +99,46 @@ class Member:
         return row
 
 
+class Members:
+    """The members of a scene in order, and what a tree over their instances needs of them.
+
+    table  (m + 1, 2) int64, the first instance and the number of each, and the number of instances last
+    filled (n,) bool, whether each instance has faces
+    """
+
+    def __init__(self, members: Iterable[Member]) -> None:
+        self.listed = list(members)
+        counts = np.array([m.count for m in self.listed], np.int64)
+        faces = np.array([len(m.built.mesh.faces) for m in self.listed], np.int64)
+        self.faces, self.filled = int((counts * faces).sum()), np.repeat(faces > 0, counts)
+        self.table = np.array([(m.begin, m.id) for m in self.listed] + [(int(counts.sum()), -1)], np.int64)
+        self.depth = max((m.built.tree.depth for m in self.listed), default=0)
+
+    def __iter__(self) -> Iterator[Member]:
+        return iter(self.listed)
+
+    def number(self, instances: NDArray[np.float64]) -> None:
+        """Write the number of the first face of each instance, and the address of its object."""
+        words, first = instances.view(np.int64), 0
+        for m in self:
+            own = words[m.begin : m.begin + m.count]
+            faces = len(m.built.mesh.faces)
+            own[:, OBJECT] = m.row.ctypes.data
+            own[:, FIRST_FACE] = first + faces * np.arange(m.count)
+            first += faces * m.count
+
+
 class SceneTree:
     """The nodes over the instances of a scene. It has what queries read of ``layout.Tree``."""
 
     has_nodes, scale = True, 1.0
 
-    def __init__(self, members: list[Member], instances: NDArray[np.float64], threads: int) -> None:
+    def __init__(self, members: Members, instances: NDArray[np.float64], threads: int) -> None:
         words = instances.view(np.int64)
-        shown = np.flatnonzero(words[:, FLAGS] & HIDDEN == 0)
-        faces = {member.id: len(member.built.mesh.faces) for member in members}
-        filled = np.repeat(np.array([faces[m.id] > 0 for m in members], np.bool_), [m.count for m in members])
-        shown = shown[filled[shown]]
-        self.members, self.instances = members, instances
+        shown = np.flatnonzero((words[:, FLAGS] & HIDDEN == 0) & members.filled)
+        self.members, self.instances, self.is_empty = members, instances, not len(shown)
         self.nodes, levels = _top(instances, words, shown, threads)
-        self.depth = levels + max((member.built.tree.depth for member in members), default=0) + 1
+        self.depth = levels + members.depth + 1
 
     def facing(self, faces: str) -> SceneTree:
         """The same for rays that hit the sides ``faces`` only."""
@@ -111,7 +152,7 @@ class SceneTree:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copy and pickle without the addresses: instances are placed anew."""
-        return tree_over, (self.members, *placement(self.members, self.instances), 1)
+        return tree_over, (self.members.listed, *placement(self.members, self.instances), 1)
 
     @lazy
     def descriptor(self) -> NDArray[np.uint64]:
@@ -139,7 +180,7 @@ def _top(
     links = nodes.view(np.int32).reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8]
     # Those of empty octants too, as a ray enters one where boxes are NaN: they become the first of all.
     leaves = links < 0
-    links[leaves] = ~shown[block_faces[4 * (~links[leaves] >> LEAF_BITS)]].astype(np.int32)
+    links[leaves] = ~shown[block_faces[BLOCK_FACES * (~links[leaves] >> LEAF_BITS)]].astype(np.int32)
     return nodes, depth
 
 
@@ -157,19 +198,26 @@ class Located(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class BuiltScene:
-    """A scene at one moment: its members in order, and the tree over their instances.
+    """A scene at one moment: the tree over the instances of its members.
 
     To queries it is its own mesh. What they need of a mesh beside its tree is here; only what no tree knows is computed
     from the merged mesh.
     """
 
-    members: list[Member]
     top: SceneTree
     threads: int
+    # The scene of which it is a moment, and the moment; copies of both are the same.
+    owner: str = field(default_factory=_new_id)
+    moment: str = field(default_factory=_new_id)
+
+    @property
+    def members(self) -> Members:
+        """The objects."""
+        return self.top.members
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Copy and pickle without what is computed when it is read."""
-        return BuiltScene, (self.members, self.top, self.threads)
+        """Copy and pickle without what is computed anew."""
+        return BuiltScene, (self.top, self.threads, self.owner, self.moment)
 
     @property
     def tree(self) -> Any:
@@ -183,16 +231,17 @@ class BuiltScene:
 
     @lazy
     def _alone(self) -> Tree | None:
-        if len(self.top.instances) != 1 or len(self.members[0].built.mesh.faces) == 0:
+        if len(self.top.instances) != 1 or self.top.is_empty:
             return None
         plain = self.top.instances.view(np.int64)[0, FLAGS] == MASK_BITS
-        (matrix,) = self.matrices(self.members[0])
-        return self.members[0].built.tree if plain and (matrix == np.eye(3, 4)).all() else None
+        only = next(m for m in self.members if m.count)
+        (matrix,) = self.matrices(only)
+        return only.built.tree if plain and (matrix == np.eye(3, 4)).all() else None
 
-    @lazy
+    @property
     def count(self) -> int:
         """The number of faces of all instances."""
-        return sum(m.count * len(m.built.mesh.faces) for m in self.members)
+        return self.members.faces
 
     def flags(self, member: Member) -> NDArray[np.int64]:
         """The masks of a member's instances, with HIDDEN of those that are not shown."""
@@ -206,8 +255,8 @@ class BuiltScene:
 
     @property
     def faces(self) -> range:
-        """The numbers of the faces of all instances."""
-        return range(self.count)
+        """The numbers of the faces of all instances; none if nothing is shown."""
+        return range(0 if self.top.is_empty else self.count)
 
     @lazy
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -266,7 +315,7 @@ class BuiltScene:
         flat, weights = np.ascontiguousarray(faces).reshape(-1), np.stack([u.reshape(-1), v.reshape(-1)])
         located, swapped = np.empty((3, len(flat)), np.int64), np.empty((2, len(flat)))
         words = self.top.instances.view(np.int64)
-        members = np.array([(m.begin, m.id) for m in self.members] + [(len(words), -1)], np.int64)
+        members = self.members.table
 
         def find(begin: int, end: int) -> None:
             locate(words, members, flat, weights, located, swapped, begin, end)
@@ -293,17 +342,20 @@ def tree_over(
 
     Raises ``ValueError`` for what cannot be placed.
     """
-    check_sizes(members)
     instances = new_records(len(transforms))
     instances.view(np.int64)[:, FLAGS] = flags
     for m in members:
         own = np.s_[m.begin : m.begin + m.count]
         place_records(m.row, instances[own], transforms[own])
-    number_faces(members, instances)
-    return SceneTree(members, instances, threads)
+    listed = Members(members)
+    check_sizes(listed.faces)
+    listed.number(instances)
+    return SceneTree(listed, instances, threads)
 
 
-def placement(members: list[Member], instances: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def placement(
+    members: Iterable[Member], instances: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """The transforms and flags from which ``tree_over`` makes the same records."""
     transforms = [np.empty((0, 3, 4)), *(matrices_of(m, instances) for m in members)]
     return np.concatenate(transforms), instances.view(np.int64)[:, FLAGS] & ~MIRRORS
@@ -316,26 +368,17 @@ def matrices_of(member: Member, instances: NDArray[np.float64]) -> NDArray[np.fl
     return own
 
 
-def check_sizes(members: list[Member]) -> None:
+def check_sizes(faces: int) -> None:
     """Raise ``ValueError`` for more faces than a scene can number."""
-    total = sum(m.count * len(m.built.mesh.faces) for m in members)
-    expect(total <= MOST_FACES, "scene", f"at most {MOST_FACES:,} faces, copies counted", f"{total:,}")
-    for member in members:
-        blocks = len(member.built.tree.faces) // 4
-        expect(blocks <= _MOST_BLOCKS, "mesh", f"at most {4 * _MOST_BLOCKS:,} faces", f"{4 * blocks:,}")
+    expect(faces <= MOST_FACES, "scene", f"at most {MOST_FACES:,} faces, copies counted", f"{faces:,}")
+
+
+def check_mesh(tree: Tree) -> None:
+    """Raise ``ValueError`` for a mesh with more blocks than a scene can number."""
+    blocks = len(tree.faces) // BLOCK_FACES
+    expect(blocks <= _MOST_BLOCKS, "mesh", f"at most {BLOCK_FACES * _MOST_BLOCKS:,} faces", f"{BLOCK_FACES * blocks:,}")
 
 
 def new_records(count: int) -> NDArray[np.float64]:
     """Memory for the records of instances."""
     return np.zeros((count, INSTANCE_WORDS))
-
-
-def number_faces(members: list[Member], instances: NDArray[np.float64]) -> None:
-    """Write the number of the first face of each instance, and the address of its object, which changes with it."""
-    words, first = instances.view(np.int64), 0
-    for m in members:
-        own = words[m.begin : m.begin + m.count]
-        faces = len(m.built.mesh.faces)
-        own[:, OBJECT] = m.row.ctypes.data
-        own[:, FIRST_FACE] = first + faces * np.arange(m.count)
-        first += faces * m.count

@@ -43,7 +43,7 @@ def scene_of_files(paths: FilePaths, threads: int) -> StoredScene:
         tree = tree_over(members, matrices, np.full(len(matrices), MASK_BITS), threads)
     except ValueError as error:
         raise MeshError(f"{paths!s:.300}: {error}") from error
-    return StoredScene(BuiltScene(members, tree, threads), len(members))
+    return StoredScene(BuiltScene(tree, threads), len(members))
 
 
 def _objects(paths: FilePaths, threads: int) -> Iterator[_Object]:

@@ -294,6 +294,21 @@ class SceneHits(_Places):
         super().__init__(hits, scene)
         self.t, self.side, self.t_error = hits.t, hits.side, hits.t_error
 
+    def __getitem__(self, rows: Any) -> SceneHits:
+        """The hits of some rays, by an index of an array of the hits' shape, such as ``hits[hits.hit]``.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box())
+        >>> hits = scene.closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1])
+        >>> hits[hits.hit].object
+        array([0])
+        """
+        return SceneHits(self._found[rows], self._scene)
+
     @property
     def hit(self) -> NDArray[np.bool_]:
         """Whether each ray hit a face, (...) bool.

@@ -6,6 +6,7 @@ import os
 from dataclasses import replace
 from threading import RLock
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,11 +22,12 @@ from renderer.queryable import Built, Queries
 from renderer.rayscene.built import (
     BuiltScene,
     Member,
+    Members,
     SceneTree,
+    check_mesh,
     check_sizes,
     matrices_of,
     new_records,
-    number_faces,
 )
 from renderer.rayscene.files import scene_of_files
 from renderer.rayscene.queries import SceneQueries
@@ -35,7 +37,7 @@ from renderer.system.threads import checked_threads
 from renderer.trace.instances import FLAGS, HIDDEN, MASK_BITS
 
 # What a copy of a scene has of its own.
-_OWN = ("_lock", "_members", "_instances", "_snapshot", "_next")
+_OWN = ("_lock", "_members", "_instances", "_added", "_count", "_faces", "_next", "_snapshot", "_listed")
 
 
 class RayScene(SceneQueries):
@@ -65,15 +67,19 @@ class RayScene(SceneQueries):
     def __init__(self, *, threads: int | None = None) -> None:
         self.threads = checked_threads(threads)
         self._lock = RLock()
-        self._members: list[Member] = []
-        self._instances = new_records(0)
+        self._members: dict[int, Member] = {}
+        # The records of instances, and of those that were added since.
+        self._instances, self._added = new_records(0), list[NDArray[np.float64]]()
+        self._count, self._faces, self._next = 0, 0, 0
+        # None where the scene, or which members it has, changed since.
         self._snapshot: BuiltScene | None = None
-        self._next = 0
+        self._listed: Members | None = None
+        self._owner = uuid4().hex
 
     def __repr__(self) -> str:
         built = self._built
         instances = sum(m.count for m in built.members)
-        return f"<RayScene of {len(built.members):,} objects, {instances:,} instances, {built.count:,} faces>"
+        return f"<RayScene of {len(built.members.listed):,} objects, {instances:,} instances, {built.count:,} faces>"
 
     def add(
         self,
@@ -155,30 +161,38 @@ class RayScene(SceneQueries):
         >>> town.closest_hit([5.5, 0.25, 9], [0, 0, -1]).instance
         array(5)
         """
+        expect(isinstance(scene, RayScene), "scene", "a RayScene", type(scene).__name__)
         outer, there = as_transforms(transforms), scene._built
         with self._lock:
-            before = self._members, self._instances, self._snapshot, self._next
-            try:
-                return {
-                    m.id: self._add(
-                        m.built, m.name, _composed(outer, there.matrices(m)), np.tile(there.flags(m), len(outer))
-                    )
-                    for m in there.members
-                }
-            except ValueError:
-                self._members, self._instances, self._snapshot, self._next = before
-                raise
+            check_sizes(self._faces + len(outer) * there.count)
+            made = {m.id: _composed(outer, there.matrices(m)) for m in there.members}
+            for m in there.members:
+                place_records(m.row, new_records(len(made[m.id])), made[m.id])  # refused before any is added
+            return {
+                m.id: self._add(m.built, m.name, made[m.id], np.tile(there.flags(m), len(outer)), m.names * len(outer))
+                for m in there.members
+            }
 
-    def _add(self, built: Built, name: str, matrices: NDArray[np.float64], flags: NDArray[np.int64]) -> int:
+    def _add(
+        self,
+        built: Built,
+        name: str,
+        matrices: NDArray[np.float64],
+        flags: NDArray[np.int64],
+        names: tuple[str, ...] = (),
+    ) -> int:
+        check_mesh(built.tree)
         with self._lock:
-            member = Member(self._next, name, built, len(self._instances), len(matrices))
-            members = [*self._members, member]
-            check_sizes(members)
+            faces = self._faces + len(matrices) * len(built.mesh.faces)
+            check_sizes(faces)
+            member = Member(self._next, name, built, self._count, len(matrices), names)
             own = new_records(len(matrices))
             own.view(np.int64)[:, FLAGS] = flags
             place_records(member.row, own, matrices)
-            self._change(members, np.concatenate([self._instances, own]))
-            self._next += 1
+            self._members[member.id] = member
+            self._added.append(own)
+            self._count, self._faces, self._next = self._count + len(own), faces, self._next + 1
+            self._snapshot = self._listed = None
             return member.id
 
     def move(self, object: int, transforms: ArrayLike, *, instances: ArrayLike | None = None) -> None:
@@ -212,11 +226,9 @@ class RayScene(SceneQueries):
             member = self._member(object)
             rows = _rows(instances, member.count)
             expect(len(matrices) == len(rows), "transforms", f"{len(rows)} matrices", f"{len(matrices)}")
-            own = self._instances[member.begin + rows]
+            own = self._records[member.begin + rows]
             place_records(member.row, own, matrices)
-            changed = self._writable()
-            changed[member.begin + rows] = own
-            self._change(self._members, changed)
+            self._writable()[member.begin + rows] = own
 
     def refit(self, object: int, vertices: ArrayLike) -> None:
         """Move the vertices of an object's mesh, as ``Octree.refit`` does; an octree that was added stays as it was.
@@ -247,19 +259,20 @@ class RayScene(SceneQueries):
             Queries.__init__(octree, *member.built, self.threads)
             octree.refit(vertices)
             refitted = replace(member, built=octree._built)
-            own = self._instances[member.begin : member.begin + member.count].copy()
-            place_records(refitted.row, own, matrices_of(member, self._instances))
-            changed = self._writable()
-            changed[member.begin : member.begin + member.count] = own
-            self._change([refitted if m.id == object else m for m in self._members], changed)
+            own = self._records[member.begin : member.begin + member.count].copy()
+            place_records(refitted.row, own, matrices_of(member, self._records))
+            self._writable()[member.begin : member.begin + member.count] = own
+            self._members[object], self._listed = refitted, None
 
-    def show(self, object: int, shown: ArrayLike = True) -> None:
-        """Show instances of an object or hide them: hidden ones are met by no ray. Numbers stay as they are.
+    def show(self, object: int, shown: ArrayLike = True, *, instances: ArrayLike | None = None) -> None:
+        """Show instances of an object or hide them: hidden ones are hit by no ray. Numbers stay as they are.
 
         Parameters
         ----------
         object : int
         shown : array_like of bool, shape () or (k,), default True
+        instances : array_like of int, shape (k,), optional
+            Which instances; None for all.
 
         Raises
         ------
@@ -273,18 +286,58 @@ class RayScene(SceneQueries):
         >>> scene = RayScene()
         >>> cube = scene.add(box())
         >>> scene.show(cube, False)
-        >>> scene.any_hit([0.5, 0.25, 9], [0, 0, -1])
-        array(False)
+        >>> scene.any_hit([[0.5, 0.25, 9]], [0, 0, -1]), scene.shown(cube)
+        (array([False]), array([False]))
         """
         with self._lock:
-            member = self._member(object)
+            rows = self._rows_of(object, instances)
             given = np.asarray(shown)
-            fits = given.dtype == np.bool_ and given.shape in ((), (member.count,))
-            expect(fits, "shown", f"a bool or {member.count} bools", f"{given.dtype} of shape {given.shape}")
-            changed = self._writable()
-            flags = changed.view(np.int64)[member.begin : member.begin + member.count, FLAGS]
-            flags[:] = np.where(given, flags & ~HIDDEN, flags | HIDDEN)
-            self._change(self._members, changed)
+            fits = given.dtype == np.bool_ and given.shape in ((), (len(rows),))
+            expect(fits, "shown", f"a bool or {len(rows)} bools", f"{given.dtype} of shape {given.shape}")
+            flags = self._writable().view(np.int64)[:, FLAGS]
+            flags[rows] = np.where(given, flags[rows] & ~HIDDEN, flags[rows] | HIDDEN)
+
+    def shown(self, object: int) -> NDArray[np.bool_]:
+        """Return whether each instance of an object is shown, (k,)."""
+        with self._lock:
+            return self._records.view(np.int64)[self._rows_of(object, None), FLAGS] & HIDDEN == 0
+
+    def mask(self, object: int, mask: ArrayLike, *, instances: ArrayLike | None = None) -> None:
+        """Change the masks of instances of an object.
+
+        Parameters
+        ----------
+        object : int
+        mask : array_like of int, shape () or (k,)
+            32 bits, as for ``add``.
+        instances : array_like of int, shape (k,), optional
+            Which instances; None for all.
+
+        Raises
+        ------
+        ValueError
+            For a bad argument.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box())
+        >>> scene.mask(cube, 0b10)
+        >>> scene.any_hit([[0.5, 0.25, 9]], [0, 0, -1], mask=0b01), scene.masks(cube)
+        (array([False]), array([2]))
+        """
+        with self._lock:
+            rows = self._rows_of(object, instances)
+            masks = _masks(mask, len(rows))
+            flags = self._writable().view(np.int64)[:, FLAGS]
+            flags[rows] = (flags[rows] & ~MASK_BITS) | masks
+
+    def masks(self, object: int) -> NDArray[np.int64]:
+        """Return the mask of each instance of an object, (k,)."""
+        with self._lock:
+            return self._records.view(np.int64)[self._rows_of(object, None), FLAGS] & MASK_BITS
 
     def remove(self, object: int) -> None:
         """Take an object out of the scene. The numbers of others stay.
@@ -309,14 +362,12 @@ class RayScene(SceneQueries):
         <RayScene of 0 objects, 0 instances, 0 faces>
         """
         with self._lock:
-            gone = self._member(object)
-            kept = np.delete(self._instances, np.s_[gone.begin : gone.begin + gone.count], axis=0)
-            members = [
-                replace(m, begin=m.begin - gone.count) if m.begin > gone.begin else m
-                for m in self._members
-                if m.id != object
-            ]
-            self._change(members, kept)
+            gone = self._members.pop(self._member(object).id)
+            self._instances = np.delete(self._records, np.s_[gone.begin : gone.begin + gone.count], axis=0)
+            for m in [m for m in self._members.values() if m.begin > gone.begin]:
+                self._members[m.id] = replace(m, begin=m.begin - gone.count)
+            self._count, self._faces = self._count - gone.count, self._faces - gone.count * len(gone.built.mesh.faces)
+            self._snapshot = self._listed = None
 
     @property
     def objects(self) -> list[int]:
@@ -331,7 +382,7 @@ class RayScene(SceneQueries):
         >>> scene.objects, scene.name(cube), len(scene.mesh(cube).faces), scene.transforms(cube).shape
         ([0], 'cube', 12, (1, 3, 4))
         """
-        return [m.id for m in self._members]
+        return list(self._members)
 
     def name(self, object: int) -> str:
         """Return the name of an object.
@@ -555,8 +606,10 @@ class RayScene(SceneQueries):
         vars(self).update(state)
 
     def _keep(self, stored: StoredScene) -> None:
-        self._members, self._instances = stored.built.members, stored.built.top.instances
-        self._snapshot, self._next = stored
+        built = self._snapshot = stored.built
+        self._owner, self._next, self._listed = built.owner, stored.next, built.members
+        self._members, self._instances, self._added = {m.id: m for m in built.members}, built.top.instances, []
+        self._count, self._faces = len(self._instances), built.count
 
     @property
     def _built(self) -> BuiltScene:
@@ -566,24 +619,38 @@ class RayScene(SceneQueries):
             with self._lock:
                 built = self._snapshot
                 if built is None:
-                    number_faces(self._members, self._instances)
-                    tree = SceneTree(self._members, self._instances, self.threads)
-                    built = self._snapshot = BuiltScene(self._members, tree, self.threads)
+                    records = self._records
+                    if self._listed is None:
+                        self._listed = Members(self._members.values())
+                        self._listed.number(records)
+                    built = BuiltScene(SceneTree(self._listed, records, self.threads), self.threads, self._owner)
+                    self._snapshot = built
         return built
 
     def _member(self, object: int) -> Member:
-        for member in self._members:
-            if member.id == object:
-                return member
-        expect(False, "object", f"one of {[m.id for m in self._members]}", repr(object))
-        raise AssertionError
+        known = isinstance(object, int | np.integer) and object in self._members
+        expect(known, "object", f"one of {str(list(self._members))[:200]}", repr(object))
+        return self._members[int(object)]
+
+    def _rows_of(self, object: int, instances: ArrayLike | None) -> NDArray[np.int64]:
+        """The records of instances of an object."""
+        member = self._member(object)
+        return member.begin + _rows(instances, member.count)
+
+    @property
+    def _records(self) -> NDArray[np.float64]:
+        """The records of all instances."""
+        if self._added:
+            self._instances, self._added = np.concatenate([self._instances, *self._added]), []
+        return self._instances
 
     def _writable(self) -> NDArray[np.float64]:
-        """The records of all instances, not those that a snapshot has."""
-        return self._instances if self._snapshot is None else self._instances.copy()
-
-    def _change(self, members: list[Member], instances: NDArray[np.float64]) -> None:
-        self._members, self._instances, self._snapshot = members, instances, None
+        """The records of all instances, to be changed: not those that a snapshot has."""
+        records = self._records
+        if self._snapshot is not None and records is self._snapshot.top.instances:
+            records = self._instances = records.copy()
+        self._snapshot = None
+        return records
 
 
 def _composed(outer: NDArray[np.float64], inner: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -607,6 +674,9 @@ def _rows(instances: ArrayLike | None, count: int) -> NDArray[np.int64]:
     if instances is None:
         return np.arange(count)
     rows = real_argument("instances", instances).reshape(-1)
+    if rows.dtype == np.bool_ and len(rows) == count:
+        rows = np.flatnonzero(rows)
+    rows = rows if len(rows) else rows.astype(np.int64)
     fits = rows.dtype.kind in "iu" and ((rows >= 0) & (rows < count)).all() and len(np.unique(rows)) == len(rows)
     expect(bool(fits), "instances", f"different integers from 0 to {count - 1}", rows.tolist()[:10])
     return rows.astype(np.int64)

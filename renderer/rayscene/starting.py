@@ -65,7 +65,12 @@ def _rows(rays: RayBatch) -> NDArray[np.float64]:
 
 def _on_faces(scene: BuiltScene, leaving: Leaving) -> Hits | Passage | None:
     if isinstance(leaving, SceneHits):
-        expect(leaving._scene is scene, "leaving", "hits on the scene as it is", "hits from before it changed")
+        expect(
+            leaving._scene.moment == scene.moment,
+            "leaving",
+            "hits on the scene as it is",
+            "hits from before it changed",
+        )
         return leaving._found
     expect(leaving is None or isinstance(leaving, Passage), "leaving", "hits of a scene", type(leaving).__name__)
     return leaving
@@ -86,6 +91,7 @@ def _ignored(scene: BuiltScene, ignore: SceneHits | None) -> NDArray[np.float64]
     if ignore is None:
         return None
     expect(isinstance(ignore, SceneHits), "ignore", "hits of a scene", type(ignore).__name__)
+    expect(ignore._scene.owner == scene.owner, "ignore", "hits of this scene", "hits of another")
     begins = {m.id: (m.begin, m.count) for m in scene.members}
     ignored = np.full(ignore.object.shape, -1.0)
     for id_ in np.unique(ignore.object[ignore.object >= 0]).tolist():

@@ -92,7 +92,7 @@ def _read(reader: Reader, threads: int) -> StoredScene:
         members.append(Member(entry["id"], entry["name"], octrees[entry["octree"]], begin, entry["instances"], names))
         begin += entry["instances"]
     expect(begin == len(transforms), "objects", f"{len(transforms)} instances in all", begin)
-    return StoredScene(BuiltScene(members, tree_over(members, transforms, flags, threads), threads), following)
+    return StoredScene(BuiltScene(tree_over(members, transforms, flags, threads), threads), following)
 
 
 def _octree(reader: Reader, number: int) -> Built:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,6 +118,22 @@ class Hits(Attributes):
         side = None if self.side is None else self.side.reshape(shape)
         pile = None if self._pile is None else self._pile.reshape(shape)
         return Hits(t, self.face.reshape(shape), u, v, self._mesh, t_error, side, pile)
+
+    def __getitem__(self, rows: Any) -> Hits:
+        """The hits of some rays, by an index of an array of the hits' shape, such as ``hits[hits.hit]``.
+
+        Examples
+        --------
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> octree = Octree(box())
+        >>> hits = octree.closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1])
+        >>> hits[hits.hit].t
+        array([2.])
+        """
+        t, face, u, v = self.t[rows], self.face[rows], self.u[rows], self.v[rows]
+        t_error, side, pile = (None if a is None else a[rows] for a in (self.t_error, self.side, self._pile))
+        return Hits(t, face, u, v, self._mesh, t_error, side, pile)
 
     @property
     def hit(self) -> NDArray[np.bool_]:

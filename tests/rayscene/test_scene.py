@@ -1,5 +1,6 @@
 """Scenes answer like the one mesh that their placed meshes make together, and know what was hit."""
 
+import copy
 import threading
 
 import numpy as np
@@ -14,10 +15,11 @@ from renderer.mesh.shapes import box, icosphere
 from renderer.trace.batch import check_rays
 
 pytestmark = pytest.mark.judges(
-    "RayScene", "RayScene.add", "RayScene.add_scene", "RayScene.all_hits", "RayScene.any_hit", "RayScene.closest_hit",
-    "RayScene.closest_point", "RayScene.contains", "RayScene.count_hits", "RayScene.count_steps", "RayScene.mesh",
-    "RayScene.merged", "RayScene.move", "RayScene.name", "RayScene.objects", "RayScene.refit", "RayScene.remove",
-    "RayScene.show", "RayScene.signed_distance", "RayScene.transforms", "RayScene.visible", "RayScene.winding_number",
+    "RayScene", "RayScene.add", "RayScene.add_scene", "RayScene.all_hits", "RayScene.any_hit",
+    "RayScene.closest_hit", "RayScene.closest_point", "RayScene.contains", "RayScene.count_hits",
+    "RayScene.count_steps", "RayScene.mask", "RayScene.masks", "RayScene.merged", "RayScene.mesh", "RayScene.move",
+    "RayScene.name", "RayScene.objects", "RayScene.refit", "RayScene.remove", "RayScene.show", "RayScene.shown",
+    "RayScene.signed_distance", "RayScene.transforms", "RayScene.visible", "RayScene.winding_number",
 )  # fmt: skip
 
 
@@ -204,6 +206,11 @@ def test_masks_choose_what_each_ray_may_hit():
     assert scene.any_hit(down, aim, mask=masks).tolist() == [found >= 0 for found in expected]
     assert scene.all_hits(down, aim, mask=0b1010).instance.tolist() == [3, 3, 1, 1]
     assert scene.closest_hit(down, aim, mask=4).instance.tolist() == [2]
+    scene.mask(0, [8, 16], instances=[31, 30])
+    assert scene.masks(0)[-2:].tolist() == [16, 8] and scene.masks(0)[0] == 1
+    assert scene.closest_hit(down, aim, mask=[8, 16, 1 << 31]).instance.tolist() == [31, 30, -1]
+    scene.mask(0, 1)
+    assert scene.closest_hit(down, aim, mask=1).instance.tolist() == [31]
 
 
 @cases("repeats", [1, 10])
@@ -295,8 +302,15 @@ def test_hidden_instances_are_hit_by_nothing_and_keep_their_numbers():
     assert scene.closest_hit(origins, [0, 0, -1]).instance.tolist() == [0, -1, 2]
     assert scene.contains([[0.5, 0.5, 0.5], [2.5, 0.5, 0.5]]).tolist() == [True, False]
     assert len(scene.merged.faces) == 24
+    assert scene.shown(cubes).tolist() == [True, False, True]
+    scene.show(cubes, False, instances=[0])
+    assert scene.closest_hit(origins, [0, 0, -1]).instance.tolist() == [-1, -1, 2]
     scene.show(cubes, False)
     assert not scene.any_hit(origins, [0, 0, -1]).any()
+    # Nothing that is shown is as nothing at all.
+    for query in (scene.contains, scene.closest_point, scene.signed_distance):
+        with pytest.raises(ValueError, match="mesh: expected faces"):
+            query([0, 0, 0])
     scene.show(cubes)
     assert scene.closest_hit(origins, [0, 0, -1]).instance.tolist() == [0, 1, 2]
 
@@ -366,6 +380,12 @@ def before_a_move(scene):
     return hits
 
 
+def another():
+    scene = RayScene()
+    scene.add(box())
+    return scene
+
+
 HERE, DOWN = [0.5, 0.25, 9], [0, 0, -1]
 FAULTS = {
     "transforms: expected matrices that can be inverted.* for instance 1": lambda s: s.add(
@@ -383,6 +403,12 @@ FAULTS = {
     "mask: expected an integer": lambda s: s.closest_hit(HERE, DOWN, mask=0.5),
     "shown: expected a bool": lambda s: s.show(0, 1),
     "leaving: expected hits of a scene": lambda s: s.closest_hit(HERE, DOWN, leaving=[0]),
+    "ignore: expected hits of this scene": lambda s: s.closest_hit(
+        HERE, DOWN, ignore=another().closest_hit(HERE, DOWN)
+    ),
+    "scene: expected a RayScene": lambda s: s.add_scene(box()),
+    "mask: expected an integer or 1 integers": lambda s: s.mask(0, [1, 2]),
+    "object: expected one of .0., got '0'": lambda s: s.remove("0"),
     "ignore: expected hits of a scene": lambda s: s.closest_hit(HERE, DOWN, ignore=3),
     "leaving: expected hits on the scene as it is": lambda s: s.any_hit(HERE, DOWN, leaving=before_a_move(s)),
     "faces: expected one of": lambda s: s.any_hit(HERE, DOWN, faces="inside"),
@@ -439,3 +465,13 @@ def test_what_a_ray_does_not_see_is_not_there_where_it_starts(repeats):
     below = scene.closest_hit(roof.points, down, leaving=roof, ignore=roof)
     assert (below.object == plate).all() and (below.t == 1).all()
     assert (scene.closest_hit(roof.points, down, leaving=roof).t == 0).all()
+
+
+def test_hits_of_a_copy_are_those_of_the_scene_until_one_of_them_changes():
+    scene = another()
+    hits, copied = scene.closest_hit(HERE, DOWN), copy.deepcopy(scene)
+    assert copied.any_hit(hits.points, [0, 0, 1], leaving=hits) == scene.any_hit(hits.points, [0, 0, 1], leaving=hits)
+    copied.move(0, np.eye(4))
+    with pytest.raises(ValueError, match="leaving: expected hits on the scene as it is"):
+        copied.any_hit(hits.points, [0, 0, 1], leaving=hits)
+    assert copied.closest_hit(HERE, DOWN, ignore=hits).object == -1
