@@ -298,7 +298,17 @@ class RayScene(SceneQueries):
             flags[rows] = np.where(given, flags[rows] & ~HIDDEN, flags[rows] | HIDDEN)
 
     def shown(self, object: int) -> NDArray[np.bool_]:
-        """Return whether each instance of an object is shown, (k,)."""
+        """Return whether each instance of an object is shown, (k,).
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box(), mask=6)
+        >>> scene.shown(cube)
+        array([ True])
+        """
         with self._lock:
             return self._records.view(np.int64)[self._rows_of(object, None), FLAGS] & HIDDEN == 0
 
@@ -335,7 +345,17 @@ class RayScene(SceneQueries):
             flags[rows] = (flags[rows] & ~MASK_BITS) | masks
 
     def masks(self, object: int) -> NDArray[np.int64]:
-        """Return the mask of each instance of an object, (k,)."""
+        """Return the mask of each instance of an object, (k,).
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box(), mask=6)
+        >>> scene.masks(cube)
+        array([6])
+        """
         with self._lock:
             return self._records.view(np.int64)[self._rows_of(object, None), FLAGS] & MASK_BITS
 
