@@ -2,7 +2,7 @@
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, icosphere
@@ -50,9 +50,9 @@ def placements() -> dict[str, list[Body]]:
     }
 
 
-def body(mesh: Mesh, linear: Floats, places: Floats) -> Body:
+def body(mesh: Mesh, linear: ArrayLike, places: ArrayLike) -> Body:
     """A mesh with linear parts (k, 3, 3) at ``places``, one for each or for all, in the digits of float32."""
-    matrices = np.empty((len(linear), 3, 4))
+    matrices = np.empty((len(np.asarray(linear)), 3, 4))
     matrices[:, :, :3], matrices[:, :, 3] = linear, places
     return Body(float32_exact(mesh.vertices), mesh.faces.astype(np.int64), float32_exact(matrices))
 

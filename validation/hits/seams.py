@@ -9,8 +9,9 @@ from numpy.random import Generator
 from renderer.mesh.mesh import Mesh
 from validation.gates import Gate
 from validation.hits import watertight
+from validation.hits.merged import made
 from validation.hits.rays import RayFamily, float32_exact
-from validation.hits.scenes import REFERENCE, made
+from validation.hits.scenes import REFERENCE
 from validation.hits.watertight import KINDS
 from validation.job import Job
 from validation.meshes import AWAY, TURN

@@ -17,6 +17,7 @@ from validation.hits.rays import families, float32_exact
 from validation.hits.refit import check_refit
 from validation.hits.verdicts import LISTED
 from validation.hits.walks import check_walks
+from validation.hits.watertight import KINDS
 from validation.job import Job
 from validation.meshes import loose
 from validation.scenes import SCENES
@@ -50,7 +51,7 @@ def steps(job: Job) -> int:
     a_mesh = len(families(*triangle, 1, SEED)) + 1
     if not job.own:
         return len(job.meshes) * a_mesh
-    placed = scenes.steps(a_mesh) + len(seams.KINDS)
+    placed = scenes.steps(a_mesh) + len(KINDS)
     return len(meshes()) * a_mesh + 2 * len(leak_meshes()) + placed + 1 + starts.steps() + 1 + mirrors.steps()
 
 
@@ -91,6 +92,7 @@ def _add_own(result: dict[str, Any], effort: HitEffort, job: Job) -> list[Gate]:
         ("starts", starts.check_starts),
         ("walks", check_walks),
         ("mirrors", mirrors.check_mirrors),
+        ("parts", scenes.check_parts),
     ):
         result[key], found = check(job)
         gates += found
