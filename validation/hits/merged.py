@@ -47,6 +47,10 @@ class Merged:
         """``RayScene.any_hit``."""
         return self.scene.any_hit(origins, directions)
 
+    def closest_point(self, points: Floats) -> MergedHits:
+        """``RayScene.closest_point``."""
+        return self.merged(self.scene.closest_point(points))
+
     def merged(self, found: Any) -> MergedHits:
         """What a query of the scene found, by numbers of faces, -1 for none."""
         number = self._first[found.object] + found.instance * self._faces[found.object] + found.face
