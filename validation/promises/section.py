@@ -157,7 +157,10 @@ PICTURES = {
 SCENES = {
     "choices of instances": Check(
         lambda: check_choices(_random()),
-        (*_of_scenes("closest_hit", "any_hit", "count_hits", "all_hits", "add", "show", "remove"), "SceneAllHits"),
+        (
+            *_of_scenes("closest_hit", "any_hit", "count_hits", "all_hits", "add", "add_scene", "show", "remove"),
+            "SceneAllHits",
+        ),
     ),
     "scenes that change": Check(
         lambda: check_moments(_random()),

@@ -32,6 +32,7 @@ _CHANGES: dict[str, Change] = {
         "mirrored-corners", call("_PlacedRows", "_call(_0, _1, _2, _3, 12, 24)")
     ),
     "faces of scenes are numbered one too high": Rule("faces-of-scene", choice(then="_ + np.int32(1)")),
+    "faces are hit from the side that is left out too": Rule("facing", value("True")),
     "masks of rays are not asked": Rule("mask-of-ray", without("and", 0)),
     "ignored instances are hit": Rule("mask-of-ray", without("and", 1)),
     "instances get no room for rounding": Rule("room-of-instance", value("0.0")),

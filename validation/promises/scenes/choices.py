@@ -1,4 +1,4 @@
-"""Which instances a ray may hit: masks, ignored, hidden and removed ones, of bodies whose corners are whole numbers."""
+"""What a ray may hit: masks, sides of faces, ignored, hidden and removed instances, of bodies with whole corners."""
 
 from collections.abc import Iterator
 from fractions import Fraction
@@ -23,13 +23,13 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _JUDGE = "integer arithmetic"
-_COUNT, _RAYS, _FEW = 7, 160, 8
+_COUNT, _RAYS, _FEW = 8, 160, 8
 _CORNER = Mesh([[0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 2]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 _ALL = 2**32 - 1
 
 
 class _Query(NamedTuple):
-    """What a query asks beside its rays, and which instances (rays, all) may be hit."""
+    """What a query asks beside its rays, and which faces (rays, all) may be hit."""
 
     options: dict[str, Any]
     allowed: Bools
@@ -39,8 +39,16 @@ def check_choices(rng: Generator) -> list[dict[str, Any]]:
     """Boxes and corners turned, mirrored, sheared and lying on each other, some hidden, then without the first ones."""
     bodies = [_body(box(), rng), _body(_CORNER, rng), _body(box(), rng)]
     masks = rng.integers(0, 16, (len(bodies), _COUNT)) + 2**31 * rng.integers(0, 2, (len(bodies), _COUNT))
-    scene, world = RayScene(), _World(bodies, rng)
-    objects = [scene.add(Mesh(*body[:2]), body.matrices, mask=mask) for body, mask in zip(bodies, masks, strict=True)]
+    # The last body stands in a scene that stands in this one twice.
+    outer = np.stack([np.eye(4), np.eye(4)[[1, 2, 0, 3]]])
+    outer[1, :3, 3] = 2.0, -1.0, 3.0
+    within = bodies[2].matrices[: _COUNT // 2]
+    bodies[2] = bodies[2]._replace(matrices=(outer[:, None] @ _square(within)).reshape(-1, 4, 4)[:, :3])
+    masks[2] = np.tile(masks[2, : _COUNT // 2], 2)
+    scene, inner, world = RayScene(), RayScene(), _World(bodies, rng)
+    objects = [scene.add(Mesh(*bodies[k][:2]), bodies[k].matrices, mask=masks[k]) for k in (0, 1)]
+    there = inner.add(Mesh(*bodies[2][:2]), within, mask=masks[2, : _COUNT // 2])
+    objects.append(scene.add_scene(inner, outer)[there])
     shown = np.ones(masks.shape, np.bool_)
     found: dict[str, list[Bools]] = {}
 
@@ -71,16 +79,25 @@ def _body(mesh: Mesh, rng: Generator) -> Body:
     return Body(mesh.vertices, mesh.faces.astype(np.int64), matrices)
 
 
+def _square(matrices: Floats) -> Floats:
+    """Matrices (k, 3, 4) as (k, 4, 4)."""
+    return np.concatenate([matrices, np.tile([[0.0, 0.0, 0.0, 1.0]], (len(matrices), 1, 1))], axis=1)
+
+
 def _queries(scene: RayScene, world: "_World", masks: Ints, rng: Generator) -> Iterator[_Query]:
-    """Masks one for each ray and one for all, each with and without what is hit first, and bounds."""
+    """Masks one for each ray and one for all, with and without what is hit first, bounds, and sides of faces."""
     for mask in (_ALL, rng.integers(0, 16, _RAYS), 5, 2**31 + rng.integers(0, 2, _RAYS)):
         meets = (np.broadcast_to(mask, _RAYS)[:, None] & masks.ravel()) != 0
         first = scene.closest_hit(*world.rays, mask=mask)
-        number = np.where(first.hit, first.object * _COUNT + first.instance, -1)
+        number = np.where(first.hit, (first.object) * _COUNT + first.instance, -1)
         passed = number[:, None] == np.arange(masks.size)
         for ignore, bounds in product((None, first), ({}, {"t_min": 0.5, "t_max": 2.0})):
-            allowed = meets if ignore is None else meets & ~passed
+            allowed = (meets if ignore is None else meets & ~passed)[:, world.instance]
             yield _Query({"mask": mask, "ignore": ignore, **bounds}, allowed)
+        for side, sign in (("front", -1), ("back", 1)):
+            yield _Query(
+                {"mask": mask, "ignore": None, "faces": side}, meets[:, world.instance] & (world.sides == sign)
+            )
 
 
 class _World:
@@ -96,6 +113,9 @@ class _World:
         directions[np.arange(_RAYS), rng.integers(0, 3, _RAYS)] = rng.choice([-4.0, 4.0], _RAYS)
         back = rng.choice([0.0, 0.5, 1.0, 2.0], (_RAYS, 1), p=[0.1, 0.3, 0.3, 0.3])
         self.rays = places_of_faces(self.corners, rng, _RAYS) - back * directions, directions
+        # Products of whole numbers: 1 where a ray goes with the normal of a face.
+        normals = np.cross(self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0])
+        self.sides = np.sign(directions @ normals.T)
         self.lines = [contacts(vertices, faces.astype(np.int32), *ray) for ray in zip(*self.rays, strict=True)]
 
     def judged(self, merged: Merged, query: _Query) -> dict[str, Bools]:
@@ -123,8 +143,8 @@ class _World:
         }
 
     def _allowed(self, line: list[Contact], may: Bools, low: float, high: float) -> list[Contact]:
-        """The contacts from ``low`` to ``high`` with those of their faces whose instances may be hit."""
-        kept = [Contact(c.t, tuple(f for f in c.faces if may[self.instance[f]])) for c in line if low <= c.t <= high]
+        """The contacts from ``low`` to ``high`` with those of their faces that may be hit."""
+        kept = [Contact(c.t, tuple(f for f in c.faces if may[f])) for c in line if low <= c.t <= high]
         return [contact for contact in kept if contact.faces]
 
     def _first(self, lines: list[list[Contact]], t: Floats, face: Ints) -> Bools:
@@ -140,9 +160,9 @@ class _World:
 
 def _few(merged: Merged, rays: tuple[Floats, Floats], options: dict[str, Any]) -> Ints:
     """The faces of closest hits of a few rays a call, which a kernel of their own traces."""
-    mask, bounds = np.broadcast_to(options["mask"], _RAYS), {k: options[k] for k in options if k.startswith("t_")}
+    mask, more = np.broadcast_to(options["mask"], _RAYS), {k: options[k] for k in options.keys() - {"mask", "ignore"}}
     parts = [slice(k, k + _FEW) for k in range(0, _RAYS, _FEW)]
-    return np.concatenate([merged.closest_hit(*(r[k] for r in rays), mask=mask[k], **bounds).face for k in parts])
+    return np.concatenate([merged.closest_hit(*(r[k] for r in rays), mask=mask[k], **more).face for k in parts])
 
 
 def _rounded(hits: list[tuple[Fraction, int]]) -> list[tuple[float, int]]:
