@@ -69,7 +69,7 @@ def changed(bodies: list[Body]) -> Merged:
     """The same scene, made of other vertices and matrices, with more objects, and queried before each change."""
     scene = RayScene()
     ray = np.zeros(3), np.ones(3)
-    extra = scene.add(box((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0)), np.eye(4))
+    extra = scene.add(box((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0)))
     for body in bodies:
         turned, inverted = np.roll(body.matrices, 1, axis=0) + 0.25, body.vertices[::-1] * 3.0
         object_ = scene.add(Mesh(inverted, body.faces), turned)
