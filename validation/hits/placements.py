@@ -33,6 +33,7 @@ def placements() -> dict[str, list[Body]]:
     near = [body(ball, turns, places), body(cube, np.roll(turns, 1, axis=0), -places)]
     return {
         "one mesh where it is": [body(hill, np.eye(3)[None], np.zeros(3))],
+        "one mesh turned": [body(hill, turns[:1], places[:1])],
         "rotations": near,
         "rotations times 1e-6": [_times(one, 1e-6) for one in near],
         "rotations times 1e6": [_times(one, 1e6) for one in near],

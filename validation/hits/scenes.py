@@ -8,10 +8,10 @@ from renderer.mesh.mesh import Mesh
 from validation.gates import Gate
 from validation.hits import mirrors
 from validation.hits.check import EXACT, HitEffort, Target, check, load_reference
-from validation.hits.merged import Merged, changed, made, parted
 from validation.hits.placements import placements
 from validation.hits.walks import check_walks
 from validation.job import Job
+from validation.merged import Merged, changed, made, parted
 from validation.oracle.placing import Body, placed
 from validation.references.mitsuba.hits import version
 from validation.references.mitsuba.instances import MitsubaInstances

@@ -9,11 +9,11 @@ from numpy.random import Generator
 from renderer.mesh.mesh import Mesh
 from validation.gates import Gate
 from validation.hits import watertight
-from validation.hits.merged import made
 from validation.hits.rays import RayFamily, float32_exact
 from validation.hits.scenes import REFERENCE
 from validation.hits.watertight import KINDS
 from validation.job import Job
+from validation.merged import made
 from validation.meshes import AWAY, TURN
 from validation.oracle.placing import Body, placed
 from validation.references.mitsuba.instances import MitsubaInstances

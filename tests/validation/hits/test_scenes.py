@@ -14,9 +14,9 @@ from renderer.rayscene.hits import SceneHits
 from validation.gates import Gate
 from validation.hits import placements, scenes, seams
 from validation.hits.check import HitEffort
-from validation.hits.merged import Merged, changed, made, parted
 from validation.hits.rays import float32_exact
 from validation.job import Job
+from validation.merged import Merged, changed, made, parted
 from validation.oracle.placing import placed
 from validation.thresholds import Thresholds
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, icosphere
 from renderer.rayscene.scene import RayScene
-from validation.hits.merged import Merged
+from validation.merged import Merged
 from validation.meshes import hilly
 from validation.oracle import exact
 from validation.oracle.distance import way_from

@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box
 from renderer.rayscene.scene import RayScene
-from validation.hits.merged import Merged
+from validation.merged import Merged
 from validation.oracle.contacts import Contact, contacts
 from validation.oracle.placing import Body, placed
 from validation.promises.row import row
-from validation.queries.places import places_of_faces
 
 Bools = NDArray[np.bool_]
 Floats = NDArray[np.float64]
@@ -112,7 +111,10 @@ class _World:
         directions = rng.integers(-4, 5, (_RAYS, 3)).astype(np.float64)
         directions[np.arange(_RAYS), rng.integers(0, 3, _RAYS)] = rng.choice([-4.0, 4.0], _RAYS)
         back = rng.choice([0.0, 0.5, 1.0, 2.0], (_RAYS, 1), p=[0.1, 0.3, 0.3, 0.3])
-        self.rays = places_of_faces(self.corners, rng, _RAYS) - back * directions, directions
+        # At corners, middles of edges and places within.
+        weights = np.array([(4, 0, 0), (2, 2, 0), (2, 1, 1)])[rng.integers(0, 3, _RAYS)] / 4.0
+        targets = np.einsum("nk,nkx->nx", weights, self.corners[rng.integers(0, len(faces), _RAYS)])
+        self.rays = targets - back * directions, directions
         # Products of whole numbers: 1 where a ray goes with the normal of a face.
         normals = np.cross(self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0])
         self.sides = np.sign(directions @ normals.T)

@@ -7,7 +7,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from renderer.mesh.shapes import box
-from validation.hits.merged import Merged, made
+from validation.merged import Merged, made
 from validation.meshes import tetrahedron
 from validation.oracle import exact
 from validation.oracle.inside import winding_number
