@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box
 from renderer.rayscene.scene import RayScene
+from renderer.trace.instances import MASK_BITS
 from validation.oracle.placing import Body
 
 Floats = NDArray[np.float64]
@@ -28,24 +29,26 @@ class MergedHits:
 
 
 class Merged:
-    """A scene that numbers the faces of its hits as ``oracle.placing.placed`` does."""
+    """A scene that numbers the faces of its hits as ``oracle.placing.placed`` does; its rays have one mask."""
 
-    def __init__(self, scene: RayScene, bodies: list[Body]) -> None:
-        self.scene = scene
-        self._faces = np.zeros(max(scene.objects) + 1, np.int64)
+    def __init__(self, scene: RayScene, bodies: list[Body], mask: int = MASK_BITS) -> None:
+        self.scene, self._mask = scene, mask
+        objects = scene.objects[: len(bodies)]
+        self._faces = np.zeros(max(objects) + 1, np.int64)
         self._first = self._faces.copy()
-        self._faces[scene.objects] = [len(body.faces) for body in bodies]
+        self._faces[objects] = [len(body.faces) for body in bodies]
         counts = [len(body.faces) * len(body.matrices) for body in bodies]
-        self._first[scene.objects] = np.cumsum([0, *counts[:-1]])
+        self._first[objects] = np.cumsum([0, *counts[:-1]])
 
     def closest_hit(self, origins: Floats, directions: Floats, leaving: Any = None, **options: Any) -> MergedHits:
         """``RayScene.closest_hit``."""
         left = leaving.found if isinstance(leaving, MergedHits) else leaving
-        return self.merged(self.scene.closest_hit(origins, directions, leaving=left, **options))
+        options = {"mask": self._mask, "leaving": left, **options}
+        return self.merged(self.scene.closest_hit(origins, directions, **options))
 
     def any_hit(self, origins: Floats, directions: Floats) -> NDArray[np.bool_]:
         """``RayScene.any_hit``."""
-        return self.scene.any_hit(origins, directions)
+        return self.scene.any_hit(origins, directions, mask=self._mask)
 
     def closest_point(self, points: Floats) -> MergedHits:
         """``RayScene.closest_point``."""
@@ -88,12 +91,21 @@ def changed(bodies: list[Body]) -> Merged:
     return Merged(scene, bodies)
 
 
-def parted(vertices: ArrayLike, faces: ArrayLike) -> Merged:
-    """A scene of three parts of a mesh, each stretched and mirrored by powers of two and placed back where it was."""
+def parted(vertices: ArrayLike, faces: ArrayLike, masked: bool = False) -> Merged:
+    """A scene of three parts of a mesh, each stretched and mirrored by powers of two and placed back where it was.
+
+    With ``masked`` each part is there twice, and rays see one of both.
+    """
     corners, bodies = np.asarray(vertices, np.float64), []
     for part, stretch in zip(np.array_split(np.asarray(faces), len(_STRETCHES)), _STRETCHES, strict=True):
         if len(part):
             order = [0, 2, 1] if np.prod(stretch) < 0.0 else [0, 1, 2]
             back = np.concatenate([np.diag(stretch), np.zeros((3, 1))], axis=1)[None]
             bodies.append(Body(corners / stretch, part[:, order], back))
-    return made(bodies)
+    if not masked:
+        return made(bodies)
+    scene = RayScene()
+    for mask in (1, 2):
+        for body in bodies:
+            scene.add(Mesh(body.vertices, body.faces), body.matrices, mask=mask)
+    return Merged(scene, bodies, mask=1)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from renderer.mesh.mesh import Mesh
@@ -31,7 +32,7 @@ _CHANGES = ("RayScene.move", "RayScene.refit", "RayScene.remove", "RayScene.show
 
 def steps(a_mesh: int) -> int:
     """Number of calls of ``job.step``, of which a mesh takes so many."""
-    return a_mesh * len(_cases()) + 1 + mirrors.steps()
+    return a_mesh * len(_cases()) + 2 * (1 + mirrors.steps())
 
 
 def check_scenes(job: Job, effort: HitEffort | None = None) -> tuple[list[dict[str, Any]], list[Gate]]:
@@ -54,10 +55,17 @@ def check_scenes(job: Job, effort: HitEffort | None = None) -> tuple[list[dict[s
 def check_parts(job: Job) -> tuple[dict[str, Any], list[Gate]]:
     """Rays that go through bodies of placed parts, and that such mirrors reflect; as ``check_walks`` and its like."""
     through, reflected = _PARTS_QUICK if job.quick else _PARTS_FULL
-    passed, gates = check_walks(job, through, parted)
-    mirrored, found = mirrors.check_mirrors(job, reflected, parted)
-    gates = [replace(gate, subject=f"placed parts: {gate.subject}", judged=_LEAVING) for gate in gates + found]
-    return {"walks": passed, "mirrors": mirrored}, gates
+    found: dict[str, Any] = {"walks": [], "mirrors": []}
+    gates: list[Gate] = []
+    for kind, masked in (("placed parts", False), ("placed parts among others that the mask leaves out", True)):
+        make = partial(parted, masked=masked)
+        for key, (records, judged) in (
+            ("walks", check_walks(job, through, make)),
+            ("mirrors", mirrors.check_mirrors(job, reflected, make)),
+        ):
+            found[key] += records
+            gates += [replace(gate, subject=f"{kind}: {gate.subject}", judged=_LEAVING) for gate in judged]
+    return found, gates
 
 
 def _cases() -> dict[str, tuple[list[Body], Callable[[list[Body]], Merged]]]:

@@ -49,6 +49,7 @@ _CHANGES: dict[str, Change] = {
     "faces of scenes are numbered one too high": Rule("faces-of-scene", choice(then="np.int32(_ + 1)")),
     "faces are hit from the side that is left out too": Rule("facing", value("True")),
     "masks of rays are not asked": Rule("mask-of-ray", without("and", 0)),
+    "faces that a mask leaves out hold starts": Rule("holders-of-mask", value("False")),
     "ignored instances are hit": Rule("mask-of-ray", without("and", 1)),
     "instances get no room for rounding": Rule("room-of-instance", value("0.0")),
     "streams in scenes exit at half their best hit": Rule("resume-in-scene", element(1, "_ * np.float32(0.5)")),
