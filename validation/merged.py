@@ -74,18 +74,15 @@ def changed(bodies: list[Body]) -> Merged:
     ray = np.zeros(3), np.ones(3)
     extra = scene.add(box((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0)))
     for body in bodies:
-        turned, inverted = np.roll(body.matrices, 1, axis=0) + 0.25, body.vertices[::-1] * 3.0
-        object_ = scene.add(Mesh(inverted, body.faces), turned)
+        object_ = scene.add(Mesh(body.vertices[::-1] * 3.0, body.faces), np.roll(body.matrices, 1, axis=0) + 0.25)
         scene.closest_hit(*ray)
         scene.refit(object_, body.vertices)
         scene.closest_hit(*ray)
-        scene.move(object_, body.matrices)
+        scene.move(object_, body.matrices[::-1] - 0.25)
         scene.show(object_, False)
-        scene.closest_hit(*ray)
-        some = np.arange(0, len(body.matrices), 2)
-        scene.move(object_, turned[some], instances=some)
-        scene.closest_hit(*ray)
-        scene.move(object_, body.matrices[some], instances=some)
+        for some in (np.arange(first, len(body.matrices), 2) for first in (0, 1)):
+            scene.closest_hit(*ray)
+            scene.move(object_, body.matrices[some], instances=some)
         scene.show(object_)
     scene.remove(extra)
     return Merged(scene, bodies)

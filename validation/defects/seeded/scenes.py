@@ -46,7 +46,7 @@ _CHANGES: dict[str, Change] = {
     "corners of mirrored instances are not exchanged": Rule(
         "mirrored-corners", call("_PlacedRows", "_call(_0, _1, _2, _3, 12, 24)")
     ),
-    "faces of scenes are numbered one too high": Rule("faces-of-scene", choice(then="np.int32(_ + 1)")),
+    "faces of scenes are numbered one too low": Rule("faces-of-scene", choice(then="np.int32(max(_ - 1, 0))")),
     "faces are hit from the side that is left out too": Rule("facing", value("True")),
     "masks of rays are not asked": Rule("mask-of-ray", without("and", 0)),
     "faces that a mask leaves out hold starts": Rule("holders-of-mask", value("False")),
