@@ -84,6 +84,7 @@ def measure(
         frames,
         meshes,
         processes,
+        scenes,
         studies,
         tree_options,
     )
@@ -109,6 +110,7 @@ def measure(
         "systems": record.described(systems), "missing": missing, "series": series, "kinds": kinds,
         "open_edges": open_edges, **rows,
         "drop_in": drop_in.run(quick, step), "calls": calls.measure(systems, step), "studies": studies.run(quick, step),
+        "scenes": scenes.measure(quick, llvm, step),
         "frames": frames.measure(quick, llvm, "mitsuba_scalar" in names, step),
         "processes": processes.measure(llvm, names, step),
         "first_answers": first_answers.measure(step),

@@ -14,9 +14,10 @@ from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
 from renderer.scene.scene import load_scene
 from validation.gates import Gate
-from validation.hits import mirrors, starts, watertight
+from validation.hits import mirrors, seams, starts, watertight
 from validation.hits.rays import float32_exact
 from validation.hits.refit import check_refit
+from validation.hits.scenes import check_parts, check_scenes
 from validation.hits.section import HitEffort, check_leaks, check_mesh
 from validation.hits.walks import check_walks
 from validation.job import Job
@@ -127,6 +128,13 @@ def queries(job: Job) -> list[Gate]:
     return found
 
 
+def scenes(job: Job) -> Iterator[Gate]:
+    """Rays at placed meshes, at seams between them, and through bodies of placed parts."""
+    yield from check_scenes(job)[1]
+    yield from seams.check_seams(job)[1]
+    yield from check_parts(job)[1]
+
+
 def studies(job: Job) -> list[Gate]:
     """Closed forms, bits beside Embree and at corners, and what holds exactly."""
     return study_section.run(job)[1]
@@ -145,6 +153,7 @@ GROUPS: dict[str, tuple[Callable[[Job], Iterable[Gate]], ...]] = {
         from_surfaces,
     ),
     "queries": (promised(promises.QUERIES), queries, extreme(51, 54)),
+    "scenes": (promised(promises.SCENES), scenes),
     "studies": (studies,),
     "pictures": (promised(promises.PICTURES), pictures, unseen, extreme(33, 45), extreme(47, 48)),
 }

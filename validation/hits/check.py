@@ -28,7 +28,6 @@ Ints = NDArray[np.int64]
 
 SEED = 2026
 EXACT = "exact arithmetic"
-_NAMES = ("Octree.closest_hit", "Octree.any_hit")
 
 # Families whose rays have no particular target. There a hit that float64 cannot decide (the ray passes an edge closer
 # than the rounding of the edge function) has a chance of 1e-9 a ray, so one would be suspicious. Rays that are aimed at
@@ -92,11 +91,20 @@ def can_judge(reference: HitReference, mesh: Mesh) -> str | None:
     return None
 
 
-class _Target(NamedTuple):
+class Target(NamedTuple):
+    """What is judged.
+
+    tracer      has ``closest_hit``, whose hits have t and the face of the mesh, and ``any_hit``
+    references  that are compared
+    judged      the tracer's public names
+    costs       seconds of exact arithmetic
+    """
+
     name: str
     mesh: Mesh
-    octree: Octree
+    tracer: Any
     references: tuple[LoadedReference, ...]
+    judged: tuple[str, ...]
     costs: dict[str, float]
 
 
@@ -115,9 +123,8 @@ class _Findings(NamedTuple):
 
 
 def check_mesh(name: str, mesh: Mesh, effort: HitEffort, job: Job) -> tuple[dict[str, Any], list[Gate]]:
-    """Check all families of rays on ``mesh``; returns a record for JSON and the gates.
+    """``check`` on an octree over ``mesh``, with all references that can judge it; the others are under ``left_out``.
 
-    A reference that cannot judge the mesh is listed with its reason under ``left_out``; exact arithmetic always judges.
     Raises ``ValueError`` for a mesh without faces, or of a size for which rays cannot be float32 numbers.
     """
     size = float(np.abs(mesh.vertices[mesh.faces]).max(initial=0.0))
@@ -125,21 +132,29 @@ def check_mesh(name: str, mesh: Mesh, effort: HitEffort, job: Job) -> tuple[dict
         raise ValueError(f"{name}: expected faces whose largest coordinate is 1e-30 to 1e30, got {size:g}")
     reasons = {reference: can_judge(reference, mesh) for reference in effort.references}
     loaded = tuple(load_reference(reference, mesh) for reference, reason in reasons.items() if reason is None)
-    target = _Target(name, mesh, Octree.from_mesh(mesh), loaded, {EXACT: 0.0})
+    target = Target(name, mesh, Octree.from_mesh(mesh), loaded, ("Octree.closest_hit", "Octree.any_hit"), {EXACT: 0.0})
+    record, gates = check(target, effort, job)
+    left_out = {reference.name: reason for reference, reason in reasons.items() if reason is not None}
+    return record | {"left_out": left_out}, gates
+
+
+def check(target: Target, effort: HitEffort, job: Job) -> tuple[dict[str, Any], list[Gate]]:
+    """Check all families of rays on a target; returns a record for JSON and the gates."""
     records: list[dict[str, Any]] = []
     gates: list[Gate] = []
-    for rays in (*families(mesh.vertices, mesh.faces, effort.rays, SEED), face_rays(mesh.vertices, mesh.faces)):
-        job.step(f"hits: {name}, {rays.name}")
+    vertices, faces = target.mesh.vertices, target.mesh.faces
+    for rays in (*families(vertices, faces, effort.rays, SEED), face_rays(vertices, faces)):
+        job.step(f"hits: {target.name}, {rays.name}")
         record, found = _check(target, rays, effort, job.thresholds.hits)
         records.append(record)
         gates += found
     return {
-        "name": name,
-        "faces": len(mesh.faces),
-        "references": [describe(one) for one in loaded],
-        "left_out": {reference.name: reason for reference, reason in reasons.items() if reason is not None},
+        "name": target.name,
+        "faces": len(faces),
+        "references": [describe(one) for one in target.references],
+        "left_out": {},
         "families": records,
-        "costs": target.costs | {one.reference.name: sum(one.seconds.values()) for one in loaded},
+        "costs": target.costs | {one.reference.name: sum(one.seconds.values()) for one in target.references},
     }, gates
 
 
@@ -150,9 +165,9 @@ def describe(loaded: LoadedReference) -> dict[str, Any]:
     return named | {"precision": reference.precision, **{f"{k}_seconds": v for k, v in loaded.seconds.items()}}
 
 
-def _check(target: _Target, rays: RayFamily, effort: HitEffort, limits: HitLimits) -> tuple[dict[str, Any], list[Gate]]:
+def _check(target: Target, rays: RayFamily, effort: HitEffort, limits: HitLimits) -> tuple[dict[str, Any], list[Gate]]:
     # Trace the rays and compare with every reference.
-    hits = target.octree.closest_hit(rays.origins, rays.directions)
+    hits = target.tracer.closest_hit(rays.origins, rays.directions)
     ours = HitArrays.told(hits.t, hits.face)
     found = _find(target, rays, ours, effort)
 
@@ -201,10 +216,11 @@ def _check(target: _Target, rays: RayFamily, effort: HitEffort, limits: HitLimit
         reason = "no ray of this family aims at an edge"
         quantities.append(("rays within rounding of an edge", near_edge, limits.near_edge, reason))
     subject = f"{target.name}, {rays.name} rays"
-    return record, [Gate("hits", subject, q, float(v), "at most", most, why, _NAMES) for q, v, most, why in quantities]
+    judged = target.judged
+    return record, [Gate("hits", subject, q, float(v), "at most", most, why, judged) for q, v, most, why in quantities]
 
 
-def _find(target: _Target, rays: RayFamily, ours: HitArrays, effort: HitEffort) -> _Findings:
+def _find(target: Target, rays: RayFamily, ours: HitArrays, effort: HitEffort) -> _Findings:
     """Compare with exact arithmetic and every reference.
 
     A slow reference gets the first rays of one seeded order, so that every smaller sample is part of every larger one.
@@ -227,19 +243,19 @@ def _find(target: _Target, rays: RayFamily, ours: HitArrays, effort: HitEffort) 
         _, here, there = np.intersect1d(rows, sample, assume_unique=True, return_indices=True)
         sizes.append(error_sizes(theirs.t[here], theirs.face[here], known.select(there)))
     comparisons = spending(target.costs, EXACT, compare.judge_all)(comparisons, vertices, faces, _JUDGED)
-    occluded = target.octree.any_hit(rays.origins, rays.directions)
+    occluded = target.tracer.any_hit(rays.origins, rays.directions)
     any_differs = int(np.count_nonzero(occluded != ours.hit))
-    return _Findings(errors, comparisons, sizes, any_differs, _few_differ(target.octree, picked, ours.select(sample)))
+    return _Findings(errors, comparisons, sizes, any_differs, _few_differ(target.tracer, picked, ours.select(sample)))
 
 
-def _few_differ(octree: Octree, rays: RayFamily, ours: HitArrays) -> int:
+def _few_differ(tracer: Any, rays: RayFamily, ours: HitArrays) -> int:
     """Number of rays with another hit in calls of one ray, two, and so on up to a packet less one, and then again."""
     differ, begin, count = 0, 0, 1
     while begin < len(rays):
         rows = np.arange(begin, min(begin + count, len(rays)))
         few = rays.select(rows)
-        hits = octree.closest_hit(few.origins, few.directions)
-        seen = octree.any_hit(few.origins, few.directions)
+        hits = tracer.closest_hit(few.origins, few.directions)
+        seen = tracer.any_hit(few.origins, few.directions)
         same = (hits.t == ours.t[rows]) & (hits.face == ours.face[rows]) & (seen == ours.hit[rows])
         differ += int(np.count_nonzero(~same))
         begin, count = begin + count, count % (WIDTH - 1) + 1

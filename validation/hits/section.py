@@ -1,4 +1,4 @@
-"""The section on hits: our octree's closest hits against every reference, disagreements judged by exact arithmetic."""
+"""The section on hits: octrees and scenes against every reference, disagreements judged by exact arithmetic."""
 
 from collections import Counter
 from typing import Any
@@ -9,7 +9,7 @@ from renderer.mesh.load import load_mesh
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
 from validation.gates import Gate
-from validation.hits import mirrors, starts
+from validation.hits import mirrors, scenes, seams, starts
 from validation.hits.check import SEED, HitEffort, check_mesh
 from validation.hits.errors import EXPONENTS
 from validation.hits.leaks import check_leaks, leak_meshes
@@ -17,6 +17,7 @@ from validation.hits.rays import families, float32_exact
 from validation.hits.refit import check_refit
 from validation.hits.verdicts import LISTED
 from validation.hits.walks import check_walks
+from validation.hits.watertight import KINDS
 from validation.job import Job
 from validation.meshes import loose
 from validation.scenes import SCENES
@@ -44,13 +45,14 @@ def meshes() -> dict[str, Mesh]:
 
 def steps(job: Job) -> int:
     """Number of calls of ``job.step``: one a family and mesh, two a closed mesh of the leaks, one for refits, and those
-    of starts.
+    of scenes and starts.
     """
     triangle = np.eye(3), np.array([[0, 1, 2]])
     a_mesh = len(families(*triangle, 1, SEED)) + 1
     if not job.own:
         return len(job.meshes) * a_mesh
-    return len(meshes()) * a_mesh + 2 * len(leak_meshes()) + 1 + starts.steps() + 1 + mirrors.steps()
+    placed = scenes.steps(a_mesh) + len(KINDS)
+    return len(meshes()) * a_mesh + 2 * len(leak_meshes()) + placed + 1 + starts.steps() + 1 + mirrors.steps()
 
 
 def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
@@ -62,21 +64,11 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
         record, found = check_mesh(name, mesh, effort, job)
         records.append(record)
         gates += found
-    names = [reference.name for reference in effort.references]
+    names = [*(reference.name for reference in effort.references), scenes.REFERENCE]
     result: dict[str, Any] = {"seed": SEED, "exponents": list(EXPONENTS), "listed": LISTED, "references": names}
     result["meshes"] = records
     if job.own:
-        result["leaks"], found = check_leaks(effort, job)
-        gates += found
-        result["refit"], found = check_refit(job)
-        gates += found
-        for key, check in (
-            ("starts", starts.check_starts),
-            ("walks", check_walks),
-            ("mirrors", mirrors.check_mirrors),
-        ):
-            result[key], found = check(job)
-            gates += found
+        gates += _add_own(result, effort, job)
     else:
         reason = "they need a closed mesh and a place within that sees all of it, as the suite's own have"
         result["leaks_left_out"] = reason
@@ -84,6 +76,27 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
     for one in (*records, result.get("leaks", {"costs": {}})):
         costs.update(one["costs"])
     return result | {"costs": dict(costs)}, gates
+
+
+def _add_own(result: dict[str, Any], effort: HitEffort, job: Job) -> list[Gate]:
+    """Add to the record what only the suite's own meshes and scenes are asked; returns the gates."""
+    records, gates = scenes.check_scenes(job)
+    result["meshes"] += records
+    result["leaks"], found = check_leaks(effort, job)
+    gates += found
+    records, found = seams.check_seams(job)
+    result["leaks"]["sets"] += records
+    gates += found
+    for key, check in (
+        ("refit", check_refit),
+        ("starts", starts.check_starts),
+        ("walks", check_walks),
+        ("mirrors", mirrors.check_mirrors),
+        ("parts", scenes.check_parts),
+    ):
+        result[key], found = check(job)
+        gates += found
+    return gates
 
 
 def _given(job: Job) -> list[tuple[str, Mesh]]:

@@ -20,6 +20,7 @@ from renderer.mesh.load import load_mesh
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere, torus
 from renderer.octree import Octree
+from renderer.rayscene.scene import RayScene
 from validation.gates import Gate
 from validation.hits.rays import RayFamily, float32_exact
 from validation.meshes import AWAY, TURN, hilly, integer_box
@@ -141,10 +142,10 @@ def aimed(kind: str, vertices: Floats, faces: NDArray[np.int32], origins: Floats
     return RayFamily(kind, origins, (1 - along) * start + along * end)
 
 
-def leaks(octree: Octree, rays: RayFamily) -> int:
+def leaks(tracer: Octree | RayScene, rays: RayFamily) -> int:
     """Number of rays that closest hit or any hit misses."""
-    missed = ~octree.closest_hit(rays.origins, rays.directions).hit
-    missed |= ~octree.any_hit(rays.origins, rays.directions)
+    missed = ~tracer.closest_hit(rays.origins, rays.directions).hit
+    missed |= ~tracer.any_hit(rays.origins, rays.directions)
     return int(np.count_nonzero(missed))
 
 

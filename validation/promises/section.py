@@ -43,6 +43,10 @@ from validation.promises.queries.piles import check_piles
 from validation.promises.queries.series import check_series
 from validation.promises.queries.signed import check_signed
 from validation.promises.queries.views import check_views
+from validation.promises.scenes.attributes import check_attributes
+from validation.promises.scenes.choices import check_choices
+from validation.promises.scenes.moments import check_moments
+from validation.promises.scenes.queries import check_queries
 
 _SEED = 2031
 _RAYS = 4096
@@ -69,6 +73,18 @@ def _of_both(*queries: str) -> tuple[str, ...]:
     return tuple(f"{kind}.{query}" for query in queries for kind in ("Octree", "BruteForce"))
 
 
+def _of_scenes(*queries: str) -> tuple[str, ...]:
+    """The public names of methods of a scene."""
+    return tuple(f"RayScene.{query}" for query in queries)
+
+
+# What hits on scenes know.
+_KNOWN_OF_HITS = (
+    *(f"{kind}.{name}" for kind in ("SceneHits", "SceneAllHits", "SceneClosestPoints")
+      for name in ("object", "instance", "face", "u", "v", "points", "normals", "colors", "texcoords", "interpolate",
+                   "take")),
+    "SceneHits.hit", "SceneHits.through", "SceneAllHits.counts", "SceneAllHits.ray", "SceneClosestPoints",
+)  # fmt: skip
 _RAYS_ASKED = _of_both("closest_hit", "any_hit", "count_hits", "all_hits")
 HITS = {
     "places of hits": Check(
@@ -138,7 +154,34 @@ PICTURES = {
     "codes": Check(check_codes, ("srgb",)),
     "boxes shown": Check(lambda: check_openings(_random(), _OPENED), ()),
 }
-_CHECKS = {**HITS, **QUERIES, **PICTURES}
+SCENES = {
+    "choices of instances": Check(
+        lambda: check_choices(_random()),
+        (
+            *_of_scenes("closest_hit", "any_hit", "count_hits", "all_hits", "add", "add_scene", "show", "remove"),
+            "SceneAllHits",
+        ),
+    ),
+    "scenes that change": Check(
+        lambda: check_moments(_random()),
+        (
+            "RayScene",
+            *_of_scenes("add", "move", "refit", "show", "remove", "objects", "name", "mesh", "transforms"),
+            "SceneHits",
+        ),
+    ),
+    "attributes of hits": Check(
+        lambda: check_attributes(_random()),
+        (*_KNOWN_OF_HITS, *_of_scenes("closest_hit", "all_hits", "closest_point")),
+    ),
+    "points and placed bodies": Check(
+        lambda: check_queries(_random()),
+        _of_scenes(
+            "contains", "signed_distance", "closest_point", "winding_number", "visible", "count_steps", "merged"
+        ),
+    ),
+}
+_CHECKS = {**HITS, **QUERIES, **PICTURES, **SCENES}
 _REASON = "a promise holds in every check"
 
 

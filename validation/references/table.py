@@ -50,17 +50,18 @@ class HitReference(NamedTuple):
     stored: Literal["float32", "float64"] | None = None
 
 
-_ALL = 10**9
+# More rays or faces than there are.
+ALL = 10**9
 
 # Measured a ray on two cores: Embree and libigl 1 us or less; Mitsuba from Python 1 to 5 us, and Embree, which finds
 # its hits, has all rays anyway; brute force 2.5 ns a face; trimesh 0.2 ms at 2,000 faces and 10 ms at 16,000.
 REFERENCES: tuple[HitReference, ...] = (
-    HitReference("embree_robust", "Embree robust", embree.version(), "float32", _ALL, _ALL, Embree),
+    HitReference("embree_robust", "Embree robust", embree.version(), "float32", ALL, ALL, Embree),
     HitReference(
-        "embree_default", "Embree default", embree.version(), "float32", _ALL, _ALL, partial(Embree, robust=False)
+        "embree_default", "Embree default", embree.version(), "float32", ALL, ALL, partial(Embree, robust=False)
     ),
-    HitReference("igl", "libigl", igl.version(), "float64", _ALL, _ALL, Igl, stored="float32"),
-    HitReference("mitsuba", "Mitsuba", mitsuba_hits.version(), "float32", 2_000, _ALL, MitsubaHits),
+    HitReference("igl", "libigl", igl.version(), "float64", ALL, ALL, Igl, stored="float32"),
+    HitReference("mitsuba", "Mitsuba", mitsuba_hits.version(), "float32", 2_000, ALL, MitsubaHits),
     HitReference("trimesh", "trimesh", trimesh_rays.version(), "float64", 200, 2_000, TrimeshRays),
     HitReference("brute_force", "brute force", metadata.version("octree-renderer"), "float64", 300, 50_000, Brute),
 )

@@ -131,12 +131,12 @@ class TestSeam:
         program = (
             "from validation.defects.changes import Wrapped; from validation.defects.inject import inject\n"
             "inject(Wrapped('{name}', lambda sound, directions: 2.0 * sound(directions)))\n"
-            "from renderer.studies import share, views; import numpy as np, json\n"
-            "print(json.dumps([float(module.lengths_of(np.ones((1, 1)))[0]) for module in (share, views)]))"
+            "from renderer.studies import share, sky; import numpy as np, json\n"
+            "print(json.dumps([float(module.lengths_of(np.ones((1, 1)))[0]) for module in (share, sky)]))"
         )
         found = [
             json.loads(python(program.format(name=name), tmp_path).stdout)
-            for name in ("share.lengths_of", "views.lengths_of")
+            for name in ("share.lengths_of", "sky.lengths_of")
         ]
         assert found == [[2.0, 2.0], [1.0, 2.0]]
 

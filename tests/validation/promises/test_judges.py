@@ -102,6 +102,6 @@ def test_none(): ...
 def test_every_public_name_has_a_judge_and_every_judge_a_public_name() -> None:
     """The checks of the suite are not run here; what they would judge stands beside them."""
     tests = set(marked(judges.ROOT / "tests"))
-    checks = [*section.HITS.values(), *section.QUERIES.values(), *section.PICTURES.values(), *holds.CHECKS.values()]
-    judged = tests.union(*(check.judged for check in checks))
+    parts = (section.HITS, section.QUERIES, section.PICTURES, section.SCENES, holds.CHECKS)
+    judged = tests.union(*(check.judged for checks in parts for check in checks.values()))
     assert judged == set(names.public_names())

@@ -74,6 +74,9 @@ def _lines(record: Mapping[str, Any]) -> Iterator[str]:
     for r in record["builds"]:
         found = ", ".join(f"{name} {ratio:.2f}" for name, ratio in r["ratios"].items())
         yield f"build of {r['mesh']}, peer's seconds over ours: {found}"
+    for r in record["scenes"]["rows"]:
+        found = ", ".join(f"{name} {ratio:.2f}" for name, ratio in r["ratios"].items())
+        yield f"scene of {r['scene']}, {r['family']} rays, peer's seconds over ours: {found}"
     frame = record["frames"]
     found = ", ".join(f"{name} {ratio:.2f}" for name, ratio in frame["ratios"].items())
     yield f"frame {frame['size']} x {frame['size']}, peer's seconds over ours: {found}"

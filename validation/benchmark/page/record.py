@@ -29,6 +29,11 @@ calls[]           rays; micros a call by contender (all runs), median; ratios by
 studies[]         mesh, points, directions, rays (those above horizons), threads, seconds; written, shadow: rays a
                   second of any_hit; memory, array: bytes that it takes, and that all rays would
   peers           by name: bare (seconds of its calls), whole, batch, by_direction, differing bits
+scenes            instances, faces: of the large scene, which has bytes an instance of our arrays, grown (by which
+                  Python's memory grows), move: seconds until the next answer (all runs), median
+  rows[]          scene, instances, faces, rays, family, hit_share; by contender: differing (rays that one of both
+                  misses), contenders: seconds, median; ratios: theirs over ours, of octree (the same faces) and
+                  mitsuba_instances
 builds[]          mesh, faces, contenders: seconds, median; ratios: theirs over ours_midpoint; ratios_refit: the build
                   of each peer over our refit
 memory[]          mesh, faces, systems: rest, peak (bytes by which a process grows), own (our own count or null)
@@ -55,11 +60,11 @@ from renderer.system.files import write_atomically
 from validation import environment
 from validation.benchmark.peers.contender import System
 
-SCHEMA = 8
+SCHEMA = 9
 KEYS = (
     "schema", "command", "date", "commit", "quick", "seconds", "environment", "systems", "missing", "series",
-    "kinds", "open_edges", "queries", "drop_in", "calls", "studies", "builds", "memory", "frames", "processes",
-    "first_answers", "trees", "targets",
+    "kinds", "open_edges", "queries", "drop_in", "calls", "studies", "scenes", "builds", "memory", "frames",
+    "processes", "first_answers", "trees", "targets",
 )  # fmt: skip
 _MORE_PACKAGES = ("open3d", "rtree", "scipy", "matplotlib")
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from validation.benchmark.measures import calls, frames, processes
 from validation.benchmark.measures.kinds import title
+from validation.benchmark.measures.scenes import INSTANCES, OCTREE
 from validation.benchmark.page import heat
 from validation.benchmark.peers.ours import OURS
 
@@ -66,12 +67,31 @@ _QUERIES = (
     ("near", "nearest", "open3d", 1.0, 2.0, f"no slower for being exact; {_BOTH}"),
     ("near", "nearest", "libigl", 3.0, 6.0, _FOURS),
 )  # fmt: skip
+# Closest hits of scenes as a ratio: beside what, in which scenes, at least, aim, and why.
+_ALONE = "one mesh where it is, against its octree"
+_SCENES = (
+    ("against Embree's instances in Mitsuba", INSTANCES, 0.8, 1.2, "theirs in float32, with gaps between instances"),
+    ("against one octree of all placed faces", OCTREE, 0.6, 0.8, "faces are placed anew for each ray, in less memory"),
+    (_ALONE, OCTREE, 0.97, 1.0, "who has one mesh pays for no others"),
+)
 
 
 def judged(record: Mapping[str, Any]) -> list[dict[str, Any]]:
     """All targets with their values in ``record``."""
     makers: tuple[Callable[[Mapping[str, Any]], Iterator[Target]], ...]
-    makers = (_first_hits, _threads, _queries, _builds, _memory, _calls, _studies, _frames, _processes, _first_answers)
+    makers = (
+        _first_hits,
+        _threads,
+        _queries,
+        _builds,
+        _memory,
+        _calls,
+        _studies,
+        _scenes,
+        _frames,
+        _processes,
+        _first_answers,
+    )
     return [target.record() for make in makers for target in make(record)]
 
 
@@ -149,6 +169,19 @@ def _studies(record: Mapping[str, Any]) -> Iterator[Target]:
     worst, where = _worst([(r["rays"] / r["seconds"] / r["shadow"], r["mesh"]) for r in rows], min)
     yield Target(f"{name}, rays a second, of shadow rays of a picture", "share", "above", 0.8, None, worst, where,
                  "the same search, of rays that go the same way")  # fmt: skip
+
+
+def _scenes(record: Mapping[str, Any]) -> Iterator[Target]:
+    of = record["scenes"]
+    where = f"{of['instances']} instances of {of['faces']} faces"
+    yield Target("scene, memory beyond the mesh's", "bytes an instance", "below", 300.0, 200.0, of["bytes"], where,
+                 "what stands many times is stored once")  # fmt: skip
+    yield Target("scene, move of all instances", "ms", "below", 10.0, 3.0, 1e3 * of["move"]["median"], where,
+                 "robots and cars move each frame: the top level alone is made anew")  # fmt: skip
+    for name, peer, least, aim, reason in _SCENES:
+        rows = [row for row in of["rows"] if peer in row["ratios"] and (row["instances"] == 1) == (name == _ALONE)]
+        worst, at = _worst([(row["ratios"][peer], f"{row['scene']}, {row['family']} rays") for row in rows], min)
+        yield Target(f"scene, {name}", "times", "above", least, aim, worst, at, reason)
 
 
 def _frames(record: Mapping[str, Any]) -> Iterator[Target]:

@@ -14,6 +14,10 @@ import numpy as np
 from renderer.system.threads import available_threads
 from validation.benchmark.peers.contender import Faces, Family, Floats, Peer, Query, System
 from validation.benchmark.peers.mitsuba_variant import LLVM, SCALAR, libllvm_path, using
+from validation.oracle.placing import Body
+from validation.references.mitsuba.instances import instances
+
+_ONE = Family("touch", np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]))
 
 
 class ScalarPeer(Peer):
@@ -82,14 +86,21 @@ def systems() -> list[System]:
     return [scalar] if libllvm_path() is None else [scalar, llvm]
 
 
+def instances_peer(bodies: list[Body]) -> LLVMPeer:
+    """A scene of instances in ``llvm_ad_rgb``, built."""
+    with using(LLVM):
+        peer = LLVMPeer(instances(bodies), _llvm_rays(_ONE))
+        peer.touch()
+    return peer
+
+
 def _loader(vertices: Floats, faces: Faces, variant: str) -> Any:
     """Convert the arrays to the variant now; the result builds the mesh object, its scene and its BVH."""
     points, corners = vertices.astype(np.float32).ravel(), faces.astype(np.uint32).ravel()
-    one = Family("touch", np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]))
     if variant == SCALAR:
-        return partial(_scalar, points, corners, _scalar_rays(one))
+        return partial(_scalar, points, corners, _scalar_rays(_ONE))
     with using(LLVM):
-        return partial(_llvm, mi.Float(points), mi.UInt32(corners), _llvm_rays(one))
+        return partial(_llvm, mi.Float(points), mi.UInt32(corners), _llvm_rays(_ONE))
 
 
 def _scalar(points: Any, corners: Any, ray: Any) -> ScalarPeer:

@@ -15,9 +15,9 @@ OURS, OURS_ONE, OURS_TWO = "ours", "ours_one_thread", "ours_two_threads"
 
 
 class Ours(Peer):
-    """Queries of an octree."""
+    """Queries of an octree, or those of a scene that it has too."""
 
-    def __init__(self, octree: Octree) -> None:
+    def __init__(self, octree: Any) -> None:
         self.octree = octree
         self._origin = np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]])
 

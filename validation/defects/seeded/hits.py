@@ -79,7 +79,7 @@ _CHANGES: dict[str, Change] = {
     "one triangle in 512 missing beyond the 65,536th": _fill_all_but(
         lambda faces: (faces > 0xFFFF) & (faces % 512 == 0)
     ),
-    "packets exit with their first hit": Rule("packet-limit", call("_most", "_least(_0, _1)")),
+    "packets exit with their first hit": Rule("packet-limit", call("most_of", "_least(_0, _1)")),
     "single rays exit at half their best hit": Rule("resume-limit", element(0, "_ * np.float32(0.5)")),
     "no box padding": Constant("FAR_PADDING", "np.float32(1.0)"),
     "boxes rounded to nearest": Function("round_up", _NEAREST_FLOAT),
@@ -122,6 +122,7 @@ _CHANGES: dict[str, Change] = {
     "a loaded tree forgets its repairs": Rule("repairs-of-file", value("None")),
     "normals of OBJ files of which some corners have one": Rule("all-have-normals", call("all", "_self.any()")),
     "a face that holds a start is hit from there": Rule("met-once", compare(">=")),
+    "faces beside a start are met from where it is rounded to": Rule("beside-start", value("np.int64(0)")),
     "a ray passes faces that coincide all at once": Rule("coincident-order", value("False")),
     "the foot of a wall does not part the face that it stands on": Rule("foot-of-wall", value("True")),
     "a fin stops rays that start beside it": Rule("bounds-one-side", without("and", 3)),

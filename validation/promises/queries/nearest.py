@@ -51,15 +51,15 @@ def check_nearest(rng: Generator) -> list[dict[str, Any]]:
     heap, shell = [], []
     for faces, points in heaps(rng):
         for asked in (Octree.from_mesh(loose(faces)), BruteForce.from_mesh(loose(faces))):
-            heap.append(_kept(asked, faces, points[::4]))
+            heap.append(exactly_near(asked, faces, points[::4]))
     # So near a corner of a face so large that the way vanishes in units of the face.
     heap.append(
-        _kept(Octree.from_mesh(loose(_LARGE)), _LARGE, np.array(list(np.ndindex(3, 3, 3)))[1:] * _LEAST - _LEAST)
+        exactly_near(Octree.from_mesh(loose(_LARGE)), _LARGE, np.array(list(np.ndindex(3, 3, 3)))[1:] * _LEAST - _LEAST)
     )
-    heap.append(_kept(Octree.from_mesh(loose(_LEANING)), _LEANING, _BEFORE + np.spacing(_BEFORE) * _steps(rng)))
+    heap.append(exactly_near(Octree.from_mesh(loose(_LEANING)), _LEANING, _BEFORE + np.spacing(_BEFORE) * _steps(rng)))
     for _ in range(_SHELLS):
         faces = _shell(rng)
-        shell.append(_kept(Octree.from_mesh(loose(faces)), faces, np.zeros((1, 3))))
+        shell.append(exactly_near(Octree.from_mesh(loose(faces)), faces, np.zeros((1, 3))))
     return [
         row("the nearest face and its distance, whatever the sizes of coordinates", _JUDGE, np.concatenate(heap)),
         row("the nearest of faces whose distances differ by some ulp", _JUDGE, np.concatenate(shell)),
@@ -86,7 +86,7 @@ def _steps(rng: Generator) -> NDArray[np.int64]:
     return np.concatenate([np.zeros((1, 3), np.int64), rng.integers(-3, 4, (60, 3))])
 
 
-def _kept(asked: Octree | BruteForce, faces: Floats, points: Floats) -> NDArray[np.bool_]:
+def exactly_near(asked: Any, faces: Floats, points: Floats) -> NDArray[np.bool_]:
     """Which answers have the exact distance, no higher face than the lowest nearest, and a point at that distance."""
     found = asked.closest_point(points)
     squares, lowest = zip(*(_nearest(point, faces) for point in points), strict=True)
@@ -102,7 +102,9 @@ def _kept(asked: Octree | BruteForce, faces: Floats, points: Floats) -> NDArray[
     least = [(Fraction(size) * _VANISHING) ** 2 for size in most.tolist()]
     tiny = [square <= one for square, one in zip(squares, least, strict=True)]
     kept &= np.where(found.distance == 0.0, tiny, np.array([square != 0 for square in squares]))
-    return kept & (np.abs(way - found.distance / reach) <= _OF_REACH)
+    # The coordinates of the nearest point are rounded too.
+    rounded = np.spacing(np.abs(points).max(axis=1)) / reach
+    return kept & (np.abs(way - found.distance / reach) <= _OF_REACH + 4.0 * rounded)
 
 
 def _nearest(point: Floats, faces: Floats) -> tuple[Fraction, int]:

@@ -26,11 +26,13 @@ class MitsubaHits:
     (array([0.5, inf]), array([ 0, -1]))
     """
 
+    _scene: Any
+
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
         points = np.array(vertices, dtype=np.float32).reshape(-1, 3)
         corners = np.array(faces, dtype=np.uint32).reshape(-1, 3)
         shape = mitsuba_scene.fill(mi.Mesh("mesh", len(points), len(corners)), points, corners)
-        self._scene: Any = mitsuba_scene.assemble({shape: 0} if len(corners) else {}, [])
+        self._scene = mitsuba_scene.assemble({shape: 0} if len(corners) else {}, [])
 
     def closest_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Closest hits of ``origins``, ``directions`` (n, 3): (t, face), t in units of |direction|.
@@ -43,5 +45,8 @@ class MitsubaHits:
         for row, ray in enumerate(mitsuba_scene.mitsuba_rays((o, d))):
             found = self._scene.ray_intersect_preliminary(ray)
             if found.is_valid():
-                t[row], face[row] = found.t, found.prim_index
+                t[row], face[row] = found.t, self._face(found)
         return t, face
+
+    def _face(self, found: Any) -> int:
+        return int(found.prim_index)

@@ -1,0 +1,1 @@
+"""Promises of scenes of placed meshes."""
