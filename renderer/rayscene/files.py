@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import compress
 from pathlib import Path
 from typing import NamedTuple
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import MeshError
-from renderer.mesh.load import FilePaths, load_mesh, load_placed, mesh_paths
+from renderer.mesh.load import FilePaths, load_placed, mesh_paths
 from renderer.mesh.placements import Placed
 from renderer.octree import Octree
 from renderer.queryable import Built
@@ -57,13 +58,15 @@ def _objects(paths: FilePaths, threads: int) -> Iterator[_Object]:
 
 
 def _placed(paths: FilePaths) -> Iterator[tuple[Path, list[Placed]]]:
-    """The meshes of each file: those of the nodes of a file that is alone, or else one."""
+    """The meshes of each file. Among several files, the names of meshes begin with that of their file."""
     files = mesh_paths(paths)
-    if isinstance(paths, str | os.PathLike) and not os.path.isdir(paths):
-        yield files[0], load_placed(files[0])
-        return
+    alone = isinstance(paths, str | os.PathLike) and not os.path.isdir(paths)
     for file in files:
-        yield file, [Placed(load_mesh(file), np.eye(4)[None], ())]
+        placed, stem = load_placed(file), Path(file.name.removesuffix(".gz")).stem
+        if not alone:
+            names = [stem if len(placed) == 1 else f"{stem}/{each.mesh.name}" for each in placed]
+            placed = [each._replace(mesh=replace(each.mesh, name=n)) for each, n in zip(placed, names, strict=True)]
+        yield file, placed
 
 
 def _invertible(placed: Placed, threads: int) -> Iterator[_Object]:

@@ -569,7 +569,8 @@ class RayScene(SceneQueries):
 
         Each mesh of a .glb or .gltf file becomes an object, and the nodes and ``EXT_mesh_gpu_instancing`` that show it
         its instances. A mesh that joints pull, or a matrix flattens, stands as an object of its own.
-        A folder or a list of files becomes a scene with an object for each file, of the file's name.
+        Any other file is an object of the file's name. In a folder or list of files, the names of several meshes of one
+        file begin with that of the file.
 
         Parameters
         ----------

@@ -192,6 +192,9 @@ def folder(tmp_path: Path) -> Path:
     glb = Glb()
     nodes = [{"mesh": 0}, {"mesh": 0, "translation": [2, 0, 0]}]
     (folder / "a.GLB.gz").write_bytes(gzip.compress(glb.file(meshes=shapes(glb), nodes=nodes)))
+    more = Glb()
+    two = [{"mesh": 0, "name": "one"}, {"mesh": 1, "name": "other"}]
+    (folder / "c.glb").write_bytes(more.file(meshes=shapes(more) + shapes(more), nodes=two))
     return folder
 
 
@@ -199,14 +202,17 @@ def summary(scene: RayScene) -> list[tuple[str, int, NDArray[np.float64]]]:
     return [(scene.name(k), len(scene.mesh(k).faces), scene.transforms(k).tolist()) for k in scene.objects]
 
 
-def test_a_folder_has_an_object_for_each_mesh_file(folder: Path) -> None:
+def test_a_folder_is_one_scene_of_the_meshes_of_its_files(folder: Path) -> None:
     scene = RayScene.from_files(folder)
     still = np.eye(4)[None, :3].tolist()
-    assert summary(scene) == [("a", 2, still), ("b", 12, still)]
+    moved = [[*still[0]], [[1, 0, 0, 2], [0, 1, 0, 0], [0, 0, 1, 0]]]
+    assert summary(scene) == [("a", 1, moved), ("b", 12, still), ("c/one", 1, still), ("c/other", 1, still)]
     assert summary(RayScene.from_files(str(folder / "b.ply"))) == [("b", 12, still)]
     several = RayScene.from_files([folder / "b.ply", folder, str(folder / "below.ply" / "c.ply")])
-    assert [scene.name(k) for scene in [several] for k in scene.objects] == ["b", "a", "b", "c"]
-    expected = Mesh.concatenate([load_mesh(folder / "a.GLB.gz"), box()])
+    assert [scene.name(k) for scene in [several] for k in scene.objects] == [
+        "b", "a", "b", "c/one", "c/other", "c",
+    ]  # fmt: skip
+    expected = Mesh.concatenate([load_mesh(folder / "a.GLB.gz"), box(), load_mesh(folder / "c.glb")])
     assert scene.merged.triangles.tobytes() == expected.triangles.tobytes()
 
 
