@@ -24,14 +24,14 @@ WHOLE: dict[str, Any] = {
     **dict.fromkeys(["leaving", "reaching", "side", "t_min", "t_max", "max_distance", "origin", "eye"], THREE),
     **dict.fromkeys(["up", "normal", "weights"], UP), "texcoords": [[0, 0], [1, 0], [0, 1]], "spacing": [1, 1],
     "distance": 1, "tolerance": 1, "bounds": [[0, 0, 0], [1, 1, 1]],
-    "values": THREE, "matrix": np.eye(4).tolist(),
+    "values": THREE, "values of take": [0, 0], "matrix": np.eye(4).tolist(),
 }  # fmt: skip
 # Beside these, what each needs: `side` goes with faces alone.
 BESIDE: dict[str, Any] = {"side": {"leaving": THREE}, "bounds": {"spacing": 1}}
 OCTREE = Octree(CORNERS, [[0, 1, 2], [0, 2, 1]])  # closed, as some ask
 HITS = OCTREE.closest_hit(THREE, UP)
-# The corners of faces are never made float64.
-UNROUNDED = {"faces"}
+# These are never made float64: the corners of faces, masks and numbers of objects.
+UNROUNDED = {"faces", "mask", "through"}
 
 
 def public() -> dict[str, Any]:
@@ -61,6 +61,10 @@ def array_arguments() -> list[tuple[str, str]]:
     ]
 
 
+def _whole(name: str, argument: str) -> Any:
+    return WHOLE.get(f"{argument} of {name}", WHOLE[argument])
+
+
 @cases("whole", [2**53 + 1, -(2**53) - 1, 2**63 - 1, -(2**63)])
 @cases(("name", "argument"), sorted(array_arguments()))
 def test_a_whole_number_that_float64_does_not_hold_is_refused(
@@ -70,12 +74,12 @@ def test_a_whole_number_that_float64_does_not_hold_is_refused(
     homes = (OCTREE.mesh, OCTREE, studies, HITS, renderer, import_module(heightfield_mesh.__module__))
     asked = getattr(next(home for home in homes if hasattr(home, name)), name)
     known = inspect.signature(asked).parameters
-    given = {n: WHOLE[n] for n, p in known.items() if p.default is p.empty and n in WHOLE}
+    given = {n: _whole(name, n) for n, p in known.items() if p.default is p.empty and n in WHOLE}
     given |= BESIDE.get(argument, {}) | ({"octree": OCTREE} if "octree" in known else {})
     given |= {"faces": [[0, 1, 2]]} if "faces" in known else {}
     given |= {"rule": "even-odd"} if "rule" in known else {}  # by which a face and its back are closed
     given |= {"path": tmp_path / "a.ply"} if name == "save" else {}
-    values = np.array(WHOLE[argument], np.int64)
+    values = np.array(_whole(name, argument), np.int64)
     asked(**given | {argument: values})
     values.flat[-1] = whole
     with pytest.raises(ValueError, match=rf"^{argument}: expected numbers that float64 holds, got the integer \d+, "):

@@ -25,8 +25,12 @@ from renderer import (
     Phong,
     PointLight,
     PreparedScene,
+    RayScene,
     RenderSettings,
     Scene,
+    SceneAllHits,
+    SceneClosestPoints,
+    SceneHits,
     SceneObject,
     Sky,
     needs_of,
@@ -90,6 +94,14 @@ def few(count: int) -> tuple[Any, Any]:
     return BALL.vertices, BALL.faces[:count]
 
 
+def ray_scene() -> RayScene:
+    made = RayScene(threads=2)
+    made.add(FULL, [np.diag([-1.0, 2.0, 1.0, 1.0]), np.eye(4)], mask=[5, 1])
+    made.show(0, np.array([True, False]))
+    made.add(box(), name="box")
+    return made
+
+
 def things() -> dict[str, Any]:
     """An object of each public class, by its name and its state."""
     octree, image = Octree.from_mesh(FULL), render(MIXED, resolution=(9, 7), planes=("depth",))
@@ -108,6 +120,9 @@ def things() -> dict[str, Any]:
         **{f"material {name}": material for name, material in MIXED.materials.items()}, "image": image,
         "pattern": studies.tregenza(), "places": studies.face_points(BALL), "study": Study("sky", {"patches": 9}),
         "scan": studies.scan(octree, [0, 0, 0], 9), "points": on_faces(octree).points,
+        "scene of rays": ray_scene(), "scene of rays, empty": RayScene(),
+        "hits of a scene": ray_scene().closest_hit(*RAYS), "all hits of a scene": ray_scene().all_hits(*RAYS),
+        "closest of a scene": ray_scene().closest_point(RAYS[0], 1.5),
         "errors": [kind("a line") for kind in (renderer.MeshError, renderer.SceneError, renderer.CutWarning,
                                                renderer.RepairWarning, renderer.SceneWarning)],
     }  # fmt: skip
@@ -126,6 +141,13 @@ def content(thing: Any) -> Any:
     if isinstance(thing, Octree | BruteForce):
         answers = [thing.closest_hit(*RAYS), thing.any_hit(*RAYS), thing.all_hits(*RAYS), thing.visible(*RAYS)]
         return type(thing), content([thing.mesh, thing.stats, thing.threads, thing.repairs, answers])
+    if isinstance(thing, RayScene):
+        held = [[thing.name(k), thing.transforms(k), thing.masks(k), thing.shown(k)] for k in thing.objects]
+        answers = [thing.closest_hit(*RAYS), thing.any_hit(*RAYS), thing.all_hits(*RAYS)]
+        return content([held, thing.objects, thing.threads, answers])
+    if isinstance(thing, SceneHits | SceneAllHits | SceneClosestPoints):
+        names = ("object", "instance", "face", "u", "v", "points", "normals", "colors", "texcoords")
+        return type(thing), content([getattr(thing, name) for name in names])
     if isinstance(thing, PreparedScene):
         pictures = [render(thing, resolution=(9, 7), max_depth=depth) for depth in {0, thing.scene.render.max_depth}]
         shown = [content([getattr(image, plane) for plane in PLANES]) for image in pictures]

@@ -9,7 +9,11 @@ from cases import cases
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import icosphere
 
-pytestmark = pytest.mark.judges("Hits.interpolate", "AllHits.interpolate", "ClosestPoints.interpolate")
+pytestmark = pytest.mark.judges(
+    "AllHits.colors", "AllHits.interpolate", "AllHits.take", "AllHits.texcoords", "ClosestPoints.colors",
+    "ClosestPoints.interpolate", "ClosestPoints.take", "ClosestPoints.texcoords", "Hits.colors", "Hits.interpolate",
+    "Hits.take", "Hits.texcoords",
+)  # fmt: skip
 
 BALL = icosphere(2)
 RNG = np.random.default_rng(9)
@@ -62,3 +66,29 @@ def test_what_values_belong_to_is_told_where_numbers_do_not_tell() -> None:
 def test_other_values_are_errors(given: Any, says: str) -> None:
     with pytest.raises(ValueError, match=says):
         Octree(BALL).closest_hit(ORIGINS, DIRECTIONS).interpolate(**given)
+
+
+def test_colours_and_texture_coordinates_are_those_at_the_points_and_faces_have_values_of_their_own():
+    """A linear map of the vertices is, interpolated, that map of the points."""
+    mesh = Mesh(BALL.vertices, BALL.faces, colors=(BALL.vertices + 1) / 2, texcoords=BALL.vertices[:, :2])
+    octree, bare = Octree(mesh), Octree(BALL)
+    rays = ORIGINS, DIRECTIONS
+    for places in (octree.closest_hit(*rays), octree.all_hits(*rays), octree.closest_point(ORIGINS, 2.5)):
+        assert (places.face >= 0).sum() > 0
+        np.testing.assert_allclose(places.colors, (places.points + 1) / 2, atol=1e-6)  # colours are float32
+        np.testing.assert_allclose(places.texcoords, places.points[:, :2], atol=1e-12)
+        numbers = np.where(places.face >= 0, places.face, np.nan)
+        np.testing.assert_array_equal(places.take(range(len(BALL.faces))), numbers)
+    hits = bare.closest_hit(ORIGINS, DIRECTIONS)
+    assert np.isnan(hits.colors).all() and np.isnan(hits.texcoords).all() and hits.texcoords.shape == (60, 2)
+
+
+def test_some_hits_are_those_of_their_rays():
+    octree = Octree(BALL)
+    hits = octree.closest_hit(ORIGINS, DIRECTIONS, t_error=True)
+    some = hits[hits.hit]
+    again = octree.closest_hit(ORIGINS[hits.hit], DIRECTIONS[hits.hit], t_error=True)
+    for name in ("t", "face", "u", "v", "side", "t_error", "points"):
+        np.testing.assert_array_equal(getattr(some, name), getattr(again, name))
+    np.testing.assert_array_equal(octree.any_hit(some.points, [0, 0, 1], leaving=some),
+                                  octree.any_hit(again.points, [0, 0, 1], leaving=again))  # fmt: skip
