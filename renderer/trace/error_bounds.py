@@ -21,8 +21,8 @@ from renderer.numerics.double_double import (
 )
 from renderer.numerics.simd import load, maximum, minimum, pointer, store
 from renderer.numerics.vec3 import dot, largest_component, largest_of_three, row3, scale, sub, three
-from renderer.trace.intersect import CORNER, ROOM
-from renderer.trace.starts.record import EDGE, SLACK, slack_of, start_pointers
+from renderer.trace.intersect import CORNER, ROOM, slack_of
+from renderer.trace.starts.record import EDGE, SLACK, start_pointers
 
 # A product of pairs errs by 7 * 2^-106 of itself, a sum by 3 * 2^-106. So a component of the normal errs by 2^-102 of
 # its two products, and its scalar product with a vector by 2^-100 of all; the rest is room for what adds these up.

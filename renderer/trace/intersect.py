@@ -25,6 +25,7 @@ from renderer.numerics.simd import (
     unlikely,
     widen,
 )
+from renderer.numerics.vec3 import largest_component
 from renderer.trace.best import FaceHit
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 
@@ -421,34 +422,34 @@ def meet_planes(tree, base, edges, seen, ray, t_min, t_max):
     denominator = edges.determinant * splat4(ray.direction_z)
     t, height = numerator / denominator, fabs(numerator)
     product = sizes.across * (sizes.across + sizes.along)
-    limit, reach = product * sizes.along * splat4(DOUBT), product * splat4(ray.slack)
+    limit = product * sizes.along * splat4(DOUBT)
     slant = product * (fabs(edges.z1 - edges.z0) + fabs(edges.z2 - edges.z0)) * splat4(SLANT)
     determinant_uncertain = fabs(edges.determinant) * sizes.along <= maximum(limit, slant)
-    near, zero = height <= limit + reach, splat4(0.0)
+    near, zero = height <= limit, splat4(0.0)
     # Of those seen, an edge function is 0 where the least or the most is.
     some = seen & movemask(determinant_uncertain | near | (edges.least == zero) | (edges.most == zero))
-    # Others whose planes are as near to the origin as it is moved: from its start the ray may pass within them.
-    beside = movemask(height < reach) & ~seen
+    # rule: beside-start
+    exact = _from_start(edges, seen, ray) if ray.slack != 0.0 else np.int64(0)
     # What only these need is computed here: they are rare, and one branch costs less than that would in each block.
-    if unlikely(some | beside != 0):
+    if unlikely(some | exact != 0):
         left = _left(tree, base, edges, ray) if ray.slack != 0.0 else np.int64(0)
-        # rule: beside-start
-        beside = beside & ~left & unsure_sides(edges, ray.slack) if beside & ~left != 0 else np.int64(0)
+        exact &= ~left
         # Most often the face that the ray leaves is the only one.
-        if some & ~left | beside != 0:
+        if some & ~left | exact != 0:
             uncertain = determinant_uncertain | near | _may_be_on_edge(edges)
             # Whether the numerator, with its error, may make a t from t_min to t_max. A t that rounding made negative
             # may be 0. ERROR has the determinant's error too, because the numerator is t times the determinant.
             base_t, error = fabs(denominator), product * sizes.along * splat4(ERROR)
             within = (height + error >= splat4(t_min) * base_t) & (height - error <= splat4(t_max) * base_t)
             ahead, extended = (t >= zero) | (height <= error), _is_extended(edges, sizes)
-            due = (uncertain & ahead & within & extended) | (height < reach)
+            due = uncertain & ahead & within & extended
             return PlaneHits(
                 t,
-                (seen & movemask(uncertain)) | (some & left),
+                (seen & movemask(uncertain)) | ((some | seen) & left) | exact,
                 seen & movemask(determinant_uncertain),
-                (seen & movemask(due) & ~left) | beside,
+                (seen & movemask(due) & ~left) | exact,
             )
+        some |= seen & left
     return PlaneHits(t, some, np.int64(0), np.int64(0))
 
 
@@ -488,6 +489,30 @@ def _may_be_on_edge(edges):
     on0 = (e0 == zero) & ((x2 & y1) | (y2 & x1))
     on1 = (e1 == zero) & ((x0 & y2) | (y0 & x2))
     return on0 | on1 | ((e2 == zero) & ((x1 & y0) | (y1 & x0)))
+
+
+@inlined
+def _from_start(edges, seen, ray):
+    if ray.slack == CORNER:
+        return near_start(edges, seen, slack_of((ray.origin_x, ray.origin_y, ray.origin_z), 0.0), False)
+    return near_start(edges, seen, ray.slack, True)
+
+
+@inlined
+def near_start(edges, seen, slack, is_off):
+    """The bits of the triangles that a ray from the surface tests from its exact start: those near it and, if the
+    origin is off it, those whose edges the ray may therefore pass on the other side. So one start decides all of them.
+    """
+    near = seen & near_planes(edges, slack)
+    return near | unsure_sides(edges, slack) if is_off else near
+
+
+@inlined
+def slack_of(o, distance):
+    """The slack of a ray that starts at o, some distance from the surface. ``near_planes`` compares heights with a
+    product that may be an eighth of the true one.
+    """
+    return 8.0 * (distance + 2.0**-51 * largest_component(o))
 
 
 @inlined

@@ -25,7 +25,7 @@ from renderer.numerics.vec3 import (
     three,
     unit_and_length,
 )
-from renderer.trace.intersect import CORNER, DOUBT, SLANT
+from renderer.trace.intersect import CORNER, DOUBT, SLANT, slack_of
 from renderer.trace.resolve import LINE, ROUNDING
 from renderer.trace.starts.anchor import anchor_of, far_from, rounded
 from renderer.trace.starts.record import (
@@ -43,7 +43,6 @@ from renderer.trace.starts.record import (
     WAY,
     Start,
     corners_of,
-    slack_of,
 )
 
 _ROUNDOFF = 2.0**-53

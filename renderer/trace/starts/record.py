@@ -6,7 +6,7 @@ import numpy as np
 
 from renderer.jit.decorators import inlined
 from renderer.numerics.simd import address, float64_pointer, int32_pointer, load, offset, pointer
-from renderer.numerics.vec3 import largest_component, row3, scale, three
+from renderer.numerics.vec3 import row3, scale, three
 
 # The head of an array of starts, int64: the float64 of a row that each ray is after the one before, 0 where no ray
 # starts on the surface; and the addresses of the mesh's vertices and faces.
@@ -93,11 +93,3 @@ def corners_of(vertices, faces, face, unit):
     """The corners of a face, as tuples, in units in which no product overflows or vanishes."""
     a, b, c = row3(faces, face)
     return scale(row3(vertices, a), unit), scale(row3(vertices, b), unit), scale(row3(vertices, c), unit)
-
-
-@inlined
-def slack_of(o, distance):
-    """The slack of a ray that starts at o, some distance from the surface. ``intersect.near_planes`` compares heights
-    with a product that may be an eighth of the true one.
-    """
-    return 8.0 * (distance + 2.0**-51 * largest_component(o))

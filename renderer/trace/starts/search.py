@@ -20,9 +20,9 @@ from renderer.trace.intersect import (
     face_in,
     hit_triangles,
     make_shear,
-    near_planes,
+    near_start,
     see_triangles,
-    unsure_sides,
+    slack_of,
 )
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import octants_around, resolved_hit
@@ -54,7 +54,6 @@ from renderer.trace.starts.record import (
     THROUGH,
     StartPointers,
     corners_in,
-    slack_of,
     start_at,
     way_back,
 )
@@ -201,14 +200,11 @@ def stopped_again(tree, departure, face, pile, memory):
 
 @inlined
 def near_bits(tree, block, departure, shear, seen):
-    """The bits of the faces of a block to test from the exact start: those near it and, if the origin is off it, those
-    whose edges the ray may therefore pass on the other side. So one start decides all of them.
-    """
+    """``near_start`` of the faces of a block."""
     if not departure.is_off and seen == 0:
         return np.int64(0)
     edges, _ = see_triangles(tree, block * BLOCK_WORDS, shear)
-    near = seen & near_planes(edges, departure.ray.slack)
-    return near | unsure_sides(edges, departure.ray.slack) if departure.is_off else near
+    return near_start(edges, seen, departure.ray.slack, departure.is_off)
 
 
 @inlined
