@@ -33,12 +33,15 @@ class Merged:
 
     def __init__(self, scene: RayScene, bodies: list[Body], mask: int = MASK_BITS) -> None:
         self.scene, self._mask = scene, mask
-        objects = scene.objects[: len(bodies)]
-        self._faces = np.zeros(max(objects) + 1, np.int64)
-        self._first = self._faces.copy()
+        objects, ends = (
+            scene.objects[: len(bodies)],
+            np.cumsum([len(body.faces) * len(body.matrices) for body in bodies]),
+        )
+        self._faces = np.zeros(max(scene.objects) + 1, np.int64)
+        # What no ray should see is beyond all faces.
+        self._first = np.full(len(self._faces), ends[-1])
         self._faces[objects] = [len(body.faces) for body in bodies]
-        counts = [len(body.faces) * len(body.matrices) for body in bodies]
-        self._first[objects] = np.cumsum([0, *counts[:-1]])
+        self._first[objects] = [0, *ends[:-1]]
 
     def closest_hit(self, origins: Floats, directions: Floats, leaving: Any = None, **options: Any) -> MergedHits:
         """``RayScene.closest_hit``."""

@@ -158,7 +158,8 @@ SCENES = {
     "choices of instances": Check(
         lambda: check_choices(_random()),
         (
-            *_of_scenes("closest_hit", "any_hit", "count_hits", "all_hits", "add", "add_scene", "show", "remove"),
+            *_of_scenes("closest_hit", "any_hit", "count_hits", "all_hits"),
+            *_of_scenes("add", "add_scene", "mask", "show", "remove"),
             "SceneAllHits",
         ),
     ),

@@ -40,7 +40,7 @@ def test_a_short_run_measures_all_and_its_page_is_drawn_again(tmp_path: Path, mo
         (systems, "_PEERS", {name: systems._PEERS[name] for name in ("embree",)} | {"nobody": ("no", "find")}),
         (meshes, "QUICK", (100, 400)), (meshes, "QUICK_FORMS", (("scan", 300),)), (calls, "_CALLS", 2),
         (command, "QUICK_RAYS", 300), (drop_in, "QUICK_RAYS", (1,)), (drop_in, "_LEAST", 1),
-        (scenes, "QUICK_MANY", (100, 9)), (scenes, "QUICK_RAYS", 50), (scenes, "FEW", 2),
+        (scenes, "QUICK_MANY", (100, 9)), (scenes, "QUICK_RAYS", 50), (scenes, "QUICK_FEW", 2),
         (studies, "QUICK_SIZE", 200), (tree_options, "QUICK_LEVEL", 1), (tree_options, "QUICK_RAYS", 50),
         (studies, "memory", lambda *_: 10), (frames, "measure", lambda *_: _FRAMES),
         (processes, "measure", lambda *_: _PROCESSES), (first_answers, "measure", lambda *_: None),

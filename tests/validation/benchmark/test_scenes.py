@@ -14,7 +14,7 @@ from validation.benchmark.peers.mitsuba_variant import libllvm_path
 @pytest.fixture(autouse=True)
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(scenes, "QUICK_MANY", (200, 300))
-    monkeypatch.setattr(scenes, "FEW", 8)
+    monkeypatch.setattr(scenes, "QUICK_FEW", 8)
     monkeypatch.setattr(scenes, "QUICK_RAYS", 2000)
 
 

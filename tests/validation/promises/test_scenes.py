@@ -66,7 +66,7 @@ def test_options_that_are_forgotten_are_found(option: str, monkeypatch: pytest.M
 
 
 def test_instances_that_stay_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(RayScene, "show", lambda *_: None)
+    monkeypatch.setattr(RayScene, "show", lambda *_, **__: None)
     assert "a ray hits what it may: closest_hit" in broken("choices")
 
 

@@ -26,10 +26,11 @@ from validation.timing import RUNS, interleaved, ratio, timed
 _SEED = 50
 # Contenders beside ours: the octree of the same faces, and Embree's instances.
 OCTREE, INSTANCES = "octree", "mitsuba_instances"
-# Faces and instances of the large scene, and rays of a family, in full and in quick runs.
+# In full and in quick runs: faces and instances of the large scene, instances of one that can be merged, and rays of a
+# family.
 MANY, QUICK_MANY = (100_000, 10_000), (10_000, 1_000)
+FEW, QUICK_FEW = 64, 16
 RAYS, QUICK_RAYS = 1_000_000, 100_000
-FEW = 64
 
 
 class _Placed(NamedTuple):
@@ -45,7 +46,7 @@ def measure(quick: bool, llvm: bool, step: Callable[[str], None]) -> dict[str, A
     """The record of a scene of many instances, one that can be merged, and one of a single mesh; see ``record``."""
     rng, (faces, count) = np.random.default_rng(_SEED), QUICK_MANY if quick else MANY
     knot = _unit(load_mesh(SCENES / "models" / "torus_knot.ply"))
-    many, few = _spread(_unit(displaced_spheres(faces)), count, rng), _spread(knot, FEW, rng)
+    many, few = _spread(_unit(displaced_spheres(faces)), count, rng), _spread(knot, QUICK_FEW if quick else FEW, rng)
     one = _Placed("1 knot", knot, body(knot, np.eye(3)[None], np.zeros(3)), 1.0)
     rays = QUICK_RAYS if quick else RAYS
     step(f"scenes: {many.name}")

@@ -9,11 +9,14 @@ from numpy.typing import NDArray
 
 from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
+from validation.meshes import loose
 from validation.promises.row import row
 
 _RAYS = 16
 # How much less the components that are not equal are: by as much as rays of one packet may differ, and by an ulp.
 _LESS = (2.0**-9, 2.0**-40, 2.0**-53)
+# Heaps of triangles, and rays from each place where one passes through another, a few a call.
+_HEAPS, _TRIANGLES, _FROM_EACH, _FEW = 4, 12, 12, 7
 
 
 def check_alone(rng: Generator) -> list[dict[str, Any]]:
@@ -33,7 +36,43 @@ def check_alone(rng: Generator) -> list[dict[str, Any]]:
             alone = octree.closest_hit(origins[k], directions[k])
             same = [_equal(getattr(alone, name), getattr(together, name)[k]) for name in ("t", "face", "u", "v")]
             kept.append(all(same) and hidden[k] == alone.hit)
-    return [row("a ray gives the same bits in any batch", "single ray", np.array(kept))]
+    leaving = np.concatenate([_leaving(rng) for _ in range(_HEAPS)])
+    return [
+        row("a ray gives the same bits in any batch", "single ray", np.array(kept)),
+        row("a ray from where an edge passes through a face gives the same bits in any batch", "few rays", leaving),
+    ]
+
+
+def _leaving(rng: Generator) -> NDArray[np.bool_]:
+    """Rays that leave a face, to either side, where rounding puts the edge of another on either side of their start."""
+    mesh = loose(rng.normal(size=(_TRIANGLES, 3, 3)))
+    places, faces = _pierced(mesh.triangles)
+    origins, left = np.repeat(places, _FROM_EACH, axis=0), np.repeat(faces, _FROM_EACH)
+    directions, side = rng.normal(size=origins.shape), rng.choice([-1, 1], len(left))
+    octree, kept = Octree.from_mesh(mesh), []
+    together = octree.closest_hit(origins, directions, leaving=left, side=side)
+    for k in range(0, len(left), _FEW):
+        some = slice(k, k + _FEW)
+        few = octree.closest_hit(origins[some], directions[some], leaving=left[some], side=side[some])
+        kept.append((few.t == together.t[some]) & (few.face == together.face[some]))
+    return np.concatenate(kept)
+
+
+def _pierced(triangles: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """The places where edges of triangles (n, 3, 3) pass through others, and the faces that have these."""
+    start, end = triangles.reshape(-1, 3), np.roll(triangles, -1, axis=1).reshape(-1, 3)
+    places, faces = [], []
+    for face, (a, b, c) in enumerate(triangles):
+        normal = np.cross(b - a, c - a)
+        first, last = (start - a) @ normal, (end - a) @ normal
+        crosses = (first * last < 0.0) & (np.arange(len(start)) // 3 != face)
+        share = first[crosses] / (first - last)[crosses]
+        points = start[crosses] + share[:, None] * (end - start)[crosses]
+        sides = [np.cross(q - p, points - p) @ normal for p, q in ((a, b), (b, c), (c, a))]
+        within = np.min(sides, axis=0) > 0.0
+        places.append(points[within])
+        faces += [face] * int(within.sum())
+    return np.concatenate(places), np.array(faces)
 
 
 def _equal(one: NDArray[Any], other: NDArray[Any]) -> bool:

@@ -35,7 +35,7 @@ class _Query(NamedTuple):
 
 
 def check_choices(rng: Generator) -> list[dict[str, Any]]:
-    """Boxes and corners turned, mirrored, sheared and lying on each other, some hidden, then without the first ones."""
+    """Boxes and corners turned, mirrored, sheared, on each other; with some hidden; and without the first ones."""
     bodies = [_body(box(), rng), _body(_CORNER, rng), _body(box(), rng)]
     masks = rng.integers(0, 16, (len(bodies), _COUNT)) + 2**31 * rng.integers(0, 2, (len(bodies), _COUNT))
     # The last body stands in a scene that stands in this one twice.
@@ -58,8 +58,13 @@ def check_choices(rng: Generator) -> list[dict[str, Any]]:
 
     ask(bodies)
     shown[:] = rng.random(masks.shape) < 0.7
-    for object_, flags in zip(objects, shown, strict=True):
-        scene.show(object_, flags)
+    some = rng.permutation(_COUNT)[: _COUNT // 2]
+    masks[1, some] = rng.integers(0, 16, len(some))
+    scene.mask(objects[1], masks[1, some], instances=some)
+    scene.show(objects[0], shown[0])
+    for object_, flags in zip(objects[1:], shown[1:], strict=True):
+        scene.show(object_, flags[some], instances=some)
+        flags[np.setdiff1d(np.arange(_COUNT), some)] = True
     ask(bodies)
     scene.remove(objects[0])
     shown[0] = False
