@@ -91,11 +91,13 @@ class Member:
         row = np.zeros(OBJECT_WORDS, np.int64)
         row[:TREE_WORDS] = tree.descriptor
         row[VERTICES], row[MESH_FACES] = mesh.vertices.ctypes.data, mesh.faces.ctypes.data
-        lower, upper = np.stack(mesh.bounds) * tree.scale if len(mesh.faces) else np.zeros((2, 3))
+        # Of the faces: a vertex that none of them has may be anywhere.
+        rows = tree.nodes[:CHILDREN].reshape(3, 2, 8).astype(np.float64) if len(mesh.faces) else np.zeros((3, 2, 8))
+        lower, upper = rows[:, 0].min(axis=1), rows[:, 1].max(axis=1)
         numbers = row.view(np.float64)
         numbers[MIDDLE : MIDDLE + 3] = lower / 2 + upper / 2
         # A rounding more, so that the box is around all corners.
-        numbers[HALF : HALF + 3] = np.nextafter((upper - lower) / 2, np.inf)
+        numbers[HALF : HALF + 3] = np.where(upper > lower, np.nextafter((upper - lower) / 2, np.inf), 0.0)
         return row
 
 

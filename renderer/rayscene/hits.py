@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -265,6 +265,21 @@ def _by_object(values: Values, meshes: dict[int, Mesh]) -> dict[int, Any]:
     return {next(iter(meshes)): values}
 
 
+class ScenePassage(NamedTuple):
+    """Where rays have gone through faces of a scene: ``SceneHits.through`` makes it, ``leaving`` takes it.
+
+    Attributes
+    ----------
+    passage : Passage
+        Of faces of the merged mesh.
+    moment : str
+        Which scene it was.
+    """
+
+    passage: Passage
+    moment: str
+
+
 class SceneHits(_Places):
     """Closest hits on a scene. Their shape (...) is that of the rays.
 
@@ -324,12 +339,12 @@ class SceneHits(_Places):
         """
         return self._found.hit
 
-    def through(self) -> Passage:
+    def through(self) -> ScenePassage:
         """Return the same places for rays that go on through the faces: ``leaving=hits.through()``.
 
         Returns
         -------
-        Passage
+        ScenePassage
 
         Examples
         --------
@@ -341,7 +356,24 @@ class SceneHits(_Places):
         >>> scene.closest_hit(hits.points, [[0, 0, -1]], leaving=hits.through()).t
         array([1.])
         """
-        return self._found.through()
+        return ScenePassage(self._found.through(), self.moment)
+
+    @property
+    def moment(self) -> str:
+        """Which scene was hit: another name after each change.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box())
+        >>> before = scene.closest_hit([0.5, 0.25, 3], [0, 0, -1]).moment
+        >>> scene.show(cube)
+        >>> before == scene.closest_hit([0.5, 0.25, 3], [0, 0, -1]).moment
+        False
+        """
+        return self._scene.moment
 
 
 class SceneAllHits(_Places):

@@ -11,7 +11,7 @@ from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.rayscene.built import BuiltScene
-from renderer.rayscene.hits import SceneHits
+from renderer.rayscene.hits import SceneHits, ScenePassage
 from renderer.results.hits import Hits, Passage
 from renderer.trace.batch import NO_STARTS, RayBatch, check_rays, offset_origins, whole_numbers
 from renderer.trace.batch import Leaving as StartsOn
@@ -19,7 +19,7 @@ from renderer.trace.instances import FLAGS, MASK_BITS
 from renderer.trace.leaving import check_leaving, shapes_of_starts
 from renderer.trace.starts.record import ALL, FACE, HEAD, IGNORED, MASK, ROW, ROW_STEP
 
-Leaving = SceneHits | Passage | None
+Leaving = SceneHits | ScenePassage | None
 
 
 class Choice(NamedTuple):
@@ -64,16 +64,13 @@ def _rows(rays: RayBatch) -> NDArray[np.float64]:
 
 
 def _on_faces(scene: BuiltScene, leaving: Leaving) -> Hits | Passage | None:
-    if isinstance(leaving, SceneHits):
-        expect(
-            leaving._scene.moment == scene.moment,
-            "leaving",
-            "hits on the scene as it is",
-            "hits from before it changed",
-        )
-        return leaving._found
-    expect(leaving is None or isinstance(leaving, Passage), "leaving", "hits of a scene", type(leaving).__name__)
-    return leaving
+    """What rays leave, as faces of the scene."""
+    if leaving is None:
+        return None
+    known = isinstance(leaving, SceneHits | ScenePassage)
+    expect(known, "leaving", "hits of a scene", type(leaving).__name__)
+    expect(leaving.moment == scene.moment, "leaving", "hits on the scene as it is", "hits from before it changed")
+    return leaving.passage if isinstance(leaving, ScenePassage) else leaving._found
 
 
 def _masks(mask: NDArray[Any], shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -19,7 +19,7 @@ from renderer.errors import expect
 from renderer.queryable import Queries
 from renderer.rayscene.hits import SceneHits
 from renderer.rayscene.scene import RayScene
-from renderer.results.hits import Hits, Passage
+from renderer.results.hits import Hits
 from renderer.studies.directions import Pattern, check_count, fibonacci_sphere
 from renderer.studies.share import ROWS as _ROWS
 from renderer.studies.share import Snapshot, check_directions, check_reach, lengths_of, limits_of, snapshot_of
@@ -251,12 +251,8 @@ def _each_return(
         goes = np.isin(cloud.objects, clear)
         if number == most or not goes.any():
             return
-        on, passage = hit[goes], hits.through()
-        assert passage.side is not None  # of closest hits it is known
-        leaving = Passage(
-            passage.face[on], passage.u[on], passage.v[on], passage.side[on], passage.pile[on]
-        )  # fmt: skip
-        gone = gone[on]
+        on = hit[goes]
+        leaving, gone = hits[on].through(), gone[on]
         beams = beams.part(on)._replace(origins=cloud.points[goes])
         hits = closest(beams.origins, beams.directions, t_max=beams.reach - gone, leaving=leaving)
 

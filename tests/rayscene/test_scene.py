@@ -20,6 +20,7 @@ pytestmark = pytest.mark.judges(
     "RayScene.count_steps", "RayScene.mask", "RayScene.masks", "RayScene.merged", "RayScene.mesh", "RayScene.move",
     "RayScene.name", "RayScene.objects", "RayScene.refit", "RayScene.remove", "RayScene.show", "RayScene.shown",
     "RayScene.signed_distance", "RayScene.transforms", "RayScene.visible", "RayScene.winding_number",
+    "SceneHits.moment",
 )  # fmt: skip
 
 
@@ -411,6 +412,7 @@ FAULTS = {
     "object: expected one of .0., got '0'": lambda s: s.remove("0"),
     "ignore: expected hits of a scene": lambda s: s.closest_hit(HERE, DOWN, ignore=3),
     "leaving: expected hits on the scene as it is": lambda s: s.any_hit(HERE, DOWN, leaving=before_a_move(s)),
+    "leaving: expected hits on the scene as it": lambda s: s.any_hit(HERE, DOWN, leaving=before_a_move(s).through()),
     "faces: expected one of": lambda s: s.any_hit(HERE, DOWN, faces="inside"),
     "faces: expected 'both' with leaving": lambda s: s.any_hit(
         HERE, DOWN, leaving=s.closest_hit(HERE, DOWN), faces="front"
@@ -475,3 +477,15 @@ def test_hits_of_a_copy_are_those_of_the_scene_until_one_of_them_changes():
     with pytest.raises(ValueError, match="leaving: expected hits on the scene as it is"):
         copied.any_hit(hits.points, [0, 0, 1], leaving=hits)
     assert copied.closest_hit(HERE, DOWN, ignore=hits).object == -1
+
+
+def test_a_vertex_that_no_face_has_costs_nothing():
+    """As many nodes and triangles are tested as without it."""
+    ball = icosphere(3)
+    far, steps = Mesh(np.vstack([ball.vertices, [[1e30, 0, 0]]]), ball.faces), []
+    for mesh in (ball, far):
+        scene = RayScene()
+        scene.add(mesh, [[[1, 0, 0, 3 * k], [0, 1, 0, 0], [0, 0, 1, 0]] for k in range(9)])
+        origins = np.random.default_rng(8).uniform(-1, 25, (99, 3))
+        steps.append(scene.count_steps(origins, [0.1, 0.2, -1.0]))
+    assert (steps[0].nodes == steps[1].nodes).all() and (steps[0].triangles == steps[1].triangles).all()
