@@ -92,7 +92,8 @@ def _run(tree: Tree, rays: RayBatch, out: NDArray[np.float64], threads: int, any
             return
         scratch, progress = _take_scratch(tree.depth), Progress(begin, 0, 0)
         while progress.begin < end or progress.following < progress.count:
-            progress, row = trace_chunk(tree.descriptor, rays, out, progress, end, any_hit, scratch)
+            *reached, row = trace_chunk(tree.descriptor, rays, out, progress, end, any_hit, scratch)
+            progress = Progress(*reached)
             if row >= 0:
                 bad.append(row)
                 break

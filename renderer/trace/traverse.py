@@ -285,9 +285,10 @@ def trace_chunk(descriptor, rays, out, progress, end, any_hit, scratch):
     """Hits of rays up to ``end`` into ``out``: the rows of ``hit_pointers``, or with ``any_hit`` bools.
 
     ``descriptor`` is the tree's, which must have nodes. ``progress`` is (begin, 0, 0) in the first call for a chunk,
-    then the first value returned by the last call, with the same scratch. A call with much work ends early; all is done
-    at (end, n, n). The second value returned is the row of the first ray out of range, or -1; if there is one, nothing
-    is traced.
+    then that of the last call, with the same scratch. A call with much work ends early; all is done at (end, n, n).
+
+    Returns the three numbers of the ``Progress``, and the row of the first ray out of range, or -1; if there is one,
+    nothing is traced. Plain numbers, as Numba would call Python to make a named tuple, and crash if Ctrl-C came then.
     """
     tree = tree_pointers(descriptor)
     source, found = ray_pointers(rays, tree.scale), hit_pointers(out, out.shape[1])
@@ -295,7 +296,7 @@ def trace_chunk(descriptor, rays, out, progress, end, any_hit, scratch):
     if bad < 0:
         query = _Query(source, found, scratch_pointers(scratch), any_hit)
         progress = _trace_on(tree, query, progress, end)
-    return progress, bad
+    return progress.begin, progress.following, progress.count, bad
 
 
 @kernel

@@ -174,6 +174,33 @@ except KeyboardInterrupt:
         running.kill()
 
 
+INTERRUPTED = """
+import signal
+import numpy as np
+from renderer import Octree
+from renderer.mesh.shapes import icosphere
+octree, rays = Octree(icosphere(6), threads=1), np.random.default_rng(1).normal(size=(10**6, 3)) * 3
+octree.closest_hit(rays[:100], -rays[:100])
+signal.signal(signal.SIGALRM, signal.default_int_handler)
+stopped = 0
+for _ in range(20):
+    signal.setitimer(signal.ITIMER_REAL, 0.02)
+    try:
+        while True:
+            octree.closest_hit(rays, 0.3 - rays)
+    except KeyboardInterrupt:
+        stopped += 1
+print(stopped)
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs an interval timer")
+def test_a_script_survives_control_c_whenever_it_comes_while_rays_are_traced() -> None:
+    """Also as a kernel returns, where Numba crashes if it has to call Python then, as for a named tuple."""
+    done = subprocess.run([sys.executable, "-P", "-c", INTERRUPTED], capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stdout) == (0, "20\n"), done.stderr[-500:]
+
+
 def test_the_command_line_says_what_was_cut_and_takes_a_budget(tmp_path: Path, capsys: Any) -> None:
     path, out = file_of(tmp_path), tmp_path / "out.png"
     arguments = ["render", str(path), "-o", str(out), "--resolution", "20x16", "--quiet"]
