@@ -30,6 +30,7 @@ from renderer.trace.walk import walk
 _T, _U, _V, _W, OUT_T, OUT_U, OUT_V, DOUBLE_ROWS = range(8)
 _FACE, _AT, _EDGES, _ORDER, OUT_FACE, OUT_SIDE, INTEGER_ROWS = range(7)
 _MERGED = -1
+_ALL_EDGES = 7
 # The place of the first hit at a ray's start, which is in no block; those after it follow. They are in the order in
 # which the ray passes them, before all others.
 _FIRST = -(1 << 40)
@@ -135,18 +136,24 @@ def _list_hits(tree, query, first, blocks, count):
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
-            edges, hit = _edges_at(tree, block, hits, i, shear), resolved_hit(tree, block, hits, i, ray, shear)
+            hit = resolved_hit(tree, block, hits, i, ray, shear)
+            edges = _edges_at(tree, block, hits, i, shear, hit)
             if tree.ways.admits(tree, hit.w, shear.direction_z):
                 count = _add_hit(tree, query, count, hit, block, i, edges)
     return count, False
 
 
 @inlined
-def _edges_at(tree, block, hits, i, shear):
-    """The edges that a ray passes, as bits, of the i-th of the ``BlockHits`` of a block."""
+def _edges_at(tree, block, hits, i, shear, resolved):
+    """The edges that a ray passes, as bits, of the i-th of the ``BlockHits`` of a block; ``resolved`` is that hit."""
     hit, edges = hit_in(hits, i), np.int64(0)
     if (hits.uncertain >> i) & 1 != 0 or hit.u == 0.0 or hit.v == 0.0 or hit.u + hit.v == hit.w:
         edges = _edges_passed(exact_sides(tree, block * BLOCK_WORDS + i, shear))
+        # rule: edges-at-start
+        if edges == _ALL_EDGES:
+            # A ray in the face's plane hits it where it begins alone, and the weights there say on which edges.
+            u, v = resolved.u == 0.0, resolved.v == 0.0
+            edges = np.int64(resolved.u + resolved.v == resolved.w) | (np.int64(u) << 1) | (np.int64(v) << 2)
     return edges
 
 
@@ -210,7 +217,8 @@ def _list_hits_from(tree, query, first, blocks, count):
             if (near >> i) & 1 != 0:
                 hit, edges = meet_near(tree, block * BLOCK_WORDS + i, departure, shear.direction_z)
             else:
-                edges, hit = _edges_at(tree, block, hits, i, shear), resolved_hit(tree, block, hits, i, ray, shear)
+                hit = resolved_hit(tree, block, hits, i, ray, shear)
+                edges = _edges_at(tree, block, hits, i, shear, hit)
                 if ray.t_min <= hit.t <= t_max:
                     largest = query.single.largest
                     hit = counted_from_start(tree, query.starts, query.row, ray, largest, hit, np.int64(face))

@@ -324,3 +324,14 @@ def test_all_faces_of_a_pile_are_hit_where_a_ray_starts_in_their_midst(accelerat
         assert found.face.tolist() == expected
         np.testing.assert_allclose(found.t, -np.array(heights)[expected], rtol=1e-12)
         assert queries.count_hits(met.points, down, leaving=left, contacts=False) == [len(expected)]
+
+
+def test_a_ray_from_a_corner_along_an_edge_has_one_contact_there():
+    """Of the corner's three faces, whose planes the ray is in, or nearly so."""
+    rng = np.random.default_rng(7)
+    for _ in range(300):
+        corners = rng.normal(size=(4, 3))
+        start, end = corners[rng.permutation(4)[:2]]
+        for queries in (Octree, BruteForce):
+            tetrahedron = queries(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]], threads=1)
+            assert tetrahedron.all_hits(start, end - start, t_max=0.0).counts == 1

@@ -79,7 +79,7 @@ def test_rays_amid_slivers(slivers, monkeypatch, kind, any_hit):
     calls = calls_of(monkeypatch, query, "trace_chunk")
     np.testing.assert_array_equal(ask(*rays), expected)
     assert len(calls) >= 2
-    states = [state for state, _ in calls]
+    states = [returned[:3] for returned in calls]
     assert states == sorted(set(states)) and states[-1][0] == 1024
     assert states[-1][1] == states[-1][2] == {"stream": 1024, "packets": 0, "both": 512}[kind]
 
