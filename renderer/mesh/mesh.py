@@ -633,16 +633,17 @@ class Mesh:
         linear = affine[:3, :3]
         with np.errstate(divide="ignore"):  # of a singular map
             mirrors = np.linalg.slogdet(linear).sign < 0  # the determinant itself may overflow or vanish
+        # All products are term by term: those of matrices have other bits on other processors.
         normals = None
         if self.normals is not None:
             # The cofactors are det times the inverse transpose, and exist for a singular map too.
             columns = np.ldexp(linear, -np.frexp(np.abs(linear).max())[1]).T
             cofactors = np.stack([np.cross(columns[(k + 1) % 3], columns[(k + 2) % 3]) for k in range(3)])
-            turned = np.stack(_unit(_columns(self.normals @ cofactors)), axis=1)
-            normals = turned * (-1.0 if mirrors else 1.0)
+            x, y, z = self.normals.T
+            turned = _unit(tuple((x * a + y * b) + z * c for a, b, c in cofactors.T))
+            normals = np.stack(turned, axis=1) * (-1.0 if mirrors else 1.0)
         faces = self.faces[:, [0, 2, 1]] if mirrors else self.faces
         with np.errstate(over="ignore", invalid="ignore"):  # the constructor rejects it with its row
-            # Term by term: a product of matrices has other bits on other processors.
             x, y, z = self.vertices.T
             vertices = np.stack([((x * a + y * b) + z * c) + d for a, b, c, d in affine[:3]], axis=1)
         return replace(self, vertices=vertices, faces=faces, normals=normals)

@@ -23,21 +23,34 @@ def pack(scene: Scene, needs: Features | None = None) -> tuple[Mesh, SceneArrays
     """
     needs = needs_of(scene) if needs is None else needs
     instances = scene.instances
-    rows = _material_rows(scene)
     starts = np.cumsum([0] + [len(i.mesh.vertices) for i in instances])
     if instances:
         vertices = np.concatenate([i.mesh.vertices for i in instances])
         faces = np.concatenate([i.mesh.faces + np.int32(s) for i, s in zip(instances, starts, strict=False)])
     else:
         vertices, faces = np.zeros((0, 3)), np.zeros((0, 3), np.int32)
-    counts = [len(i.mesh.faces) for i in instances]
-    mesh = Mesh(vertices, faces)
-    arrays = SceneArrays(
+    counts = [i.faces for i in instances]
+    mesh, lit = Mesh(vertices, faces), without_faces(scene, needs)
+    arrays = lit._replace(
         vertices=mesh.vertices,
         normals=_normals(scene, len(vertices)) if needs.smooth_normals else np.zeros((0, 3)),
         faces=mesh.faces,
-        material=np.repeat(np.array([rows[i.material] for i in instances], np.int32), counts),
-        smooth=np.repeat([i.smooth for i in instances], counts if needs.smooth_normals else 0).astype(np.bool_),
+        material=np.repeat(lit.material, counts),
+        smooth=np.repeat(lit.smooth, counts if len(lit.smooth) else 0),
+    )
+    return mesh, arrays
+
+
+def without_faces(scene: Scene, needs: Features) -> SceneArrays:
+    """What the kernel reads beside the faces, with a row of ``material`` and ``smooth`` for each instance."""
+    rows = _material_rows(scene)
+    return SceneArrays(
+        vertices=np.zeros((0, 3)),
+        normals=np.zeros((0, 3)),
+        faces=np.zeros((0, 3), np.int32),
+        placed=np.zeros(0, np.int64),
+        material=np.array([rows[i.material] for i in scene.instances], np.int32),
+        smooth=np.array([i.smooth for i in scene.instances if needs.smooth_normals], np.bool_),
         materials=_materials(scene, needs),
         lights=light_rows(scene, needs),
         colors=_colors(scene),
@@ -47,7 +60,6 @@ def pack(scene: Scene, needs: Features | None = None) -> tuple[Mesh, SceneArrays
         soft=scene.render.terminator == "soft",
         clear=scene.render.glass_shadows == "clear",
     )
-    return mesh, arrays
 
 
 def repacked(arrays: SceneArrays, scene: Scene, needs: Features) -> SceneArrays:
@@ -96,10 +108,13 @@ def _material_rows(scene: Scene) -> dict[str, int]:
 
 def media_around(scene: Scene, camera: Camera) -> NDArray[np.int64]:
     """Materials of the closed, light-passing meshes around the camera's eye, outermost (by volume) first."""
-    rows, around = _material_rows(scene), list[tuple[float, int]]()
+    rows, around, eye = _material_rows(scene), list[tuple[float, int]](), np.array(camera.eye)
     for instance in scene.instances:
-        if scene.materials[instance.material].passes_light and _is_inside(instance.mesh, np.array(camera.eye)):
-            p0, p1, p2 = instance.mesh.triangles.transpose(1, 0, 2)
+        if not (scene.materials[instance.material].passes_light and instance.may_contain(eye)):
+            continue
+        mesh = instance.placed()
+        if _is_inside(mesh, eye):
+            p0, p1, p2 = mesh.triangles.transpose(1, 0, 2)
             with np.errstate(over="ignore", invalid="ignore"):  # such sizes are refused when the tree is built
                 volume = abs(np.einsum("nk,nk->", p0, np.cross(p1, p2)))
             around.append((volume, rows[instance.material]))

@@ -14,7 +14,9 @@ from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
 from renderer.picture.image import PLANES, Image
 from renderer.picture.pack import media_around, pack
+from renderer.picture.placed import placed, placed_arrays
 from renderer.picture.touching import find_touching, touching_faces
+from renderer.rayscene.built import BuiltScene, SceneTree
 from renderer.scene.camera import Camera, sample_offsets
 from renderer.scene.needs import Features
 from renderer.scene.scene import RenderSettings, Scene
@@ -44,10 +46,8 @@ class PreparedScene:
     ----------
     scene : Scene
         The scene that it is made of.
-    mesh : Mesh
-        The triangles of all meshes of the scene, in their order.
-    octree : Octree or BruteForce
-        The tree over ``mesh``; ``BruteForce`` where there are few faces.
+    built : Octree, BruteForce or BuiltScene
+        What rays are traced against: meshes that stand in the scene many times are kept once.
     needs : Needs
         The features that are ready, at least those of ``needs_of(scene)``.
     build_seconds : float
@@ -65,20 +65,43 @@ class PreparedScene:
     """
 
     scene: Scene
-    mesh: Mesh
-    octree: Octree | BruteForce
+    built: Octree | BruteForce | BuiltScene
     needs: Features
     arrays: SceneArrays
-    tree: Tree
+    tree: Tree | SceneTree
     build_seconds: float
+
+    @property
+    def mesh(self) -> Mesh:
+        """The triangles of all meshes of the scene, in their order: Mesh.
+
+        Examples
+        --------
+        >>> from renderer import load_scene, prepare
+        >>> len(prepare(load_scene("scenes/stairs.toml")).mesh.faces)
+        26
+        """
+        return self.octree.mesh
+
+    @property
+    def octree(self) -> Octree | BruteForce:
+        """The tree over ``mesh``; ``BruteForce`` where there are few faces.
+
+        Examples
+        --------
+        >>> from renderer import load_scene, prepare
+        >>> prepare(load_scene("scenes/glass.toml")).octree.closest_hit([0, 9, 0], [0, -1, 0]).hit
+        array(True)
+        """
+        return self.built.merged if isinstance(self.built, BuiltScene) else self.built
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles make the kernels' arrays anew, so that they are of the types that kernels know."""
-        return _restored, (self.scene, self.octree, self.needs, self.build_seconds)
+        return _restored, (self.scene, self.built, self.needs, self.build_seconds)
 
     @lazy
     def touching(self) -> NDArray[np.uint8]:
-        """A mark for each face that coincides with another, for any materials: ndarray, uint8.
+        """A mark for each face that may coincide with another, for any materials: ndarray, uint8.
 
         Examples
         --------
@@ -88,7 +111,9 @@ class PreparedScene:
         >>> bool(prepare(Scene(camera=eye, materials={"grey": Phong()}, objects=[cube, cube])).touching.all())
         True
         """
-        return touching_faces(self.tree, self.arrays, available_threads(), every=True)
+        marks = touching_faces(self.tree, self.arrays, available_threads(), every=True)
+        placed = isinstance(self.tree, SceneTree) and len(marks) > 0
+        return np.repeat(marks, [i.faces for i in self.scene.instances]) if placed else marks
 
     def picture(
         self,
@@ -143,23 +168,39 @@ def prepare_scene(
     threads: int | None = None,
 ) -> PreparedScene:
     """Make ``scene`` ready, by checked arguments; see ``render``."""
-    clock = Stopwatch()
+    clock, threads = Stopwatch(), checked_threads(threads)
+    built = placed(scene, split, threads) if accelerator == "auto" and needs.octree else None
+    if built is not None:
+        return _with_touching(scene, built, needs, placed_arrays(scene, needs, built), threads, clock)
     mesh, arrays = pack(scene, needs)
     octree = build_octree(mesh, accelerator, split, needs, threads)
-    tree = tree_for(octree, needs)
-    arrays = find_touching(tree, arrays, needs, checked_threads(threads))
-    return PreparedScene(scene, mesh, octree, needs, arrays, tree, clock.seconds())
+    return _with_touching(scene, octree, needs, arrays, threads, clock)
 
 
-def _bundles_in_a_row(tree: Tree) -> int:
+def _with_touching(
+    scene: Scene,
+    built: Octree | BruteForce | BuiltScene,
+    needs: Features,
+    arrays: SceneArrays,
+    threads: int,
+    clock: Stopwatch,
+) -> PreparedScene:
+    tree = built.top if isinstance(built, BuiltScene) else tree_for(built, needs)
+    arrays = find_touching(tree, arrays, needs, threads)
+    return PreparedScene(scene, built, needs, arrays, tree, clock.seconds())
+
+
+def _bundles_in_a_row(tree: Tree | SceneTree) -> int:
     """The number of bundles per call of the kernel: some 10 ms, so that Ctrl-C takes effect soon."""
-    return 256 if tree.has_nodes else max(1, rays_against_blocks(tree) // SIZE)
+    return 256 if isinstance(tree, SceneTree) or tree.has_nodes else max(1, rays_against_blocks(tree) // SIZE)
 
 
-def _restored(scene: Scene, octree: Octree | BruteForce, needs: Features, build_seconds: float) -> PreparedScene:
-    (_, arrays), tree = pack(scene, needs), tree_for(octree, needs)
-    arrays = find_touching(tree, arrays, needs, checked_threads(None))
-    return PreparedScene(scene, octree.mesh, octree, needs, arrays, tree, build_seconds)
+def _restored(
+    scene: Scene, built: Octree | BruteForce | BuiltScene, needs: Features, build_seconds: float
+) -> PreparedScene:
+    arrays = placed_arrays(scene, needs, built) if isinstance(built, BuiltScene) else pack(scene, needs)[1]
+    restored = _with_touching(scene, built, needs, arrays, checked_threads(None), Stopwatch())
+    return replace(restored, build_seconds=build_seconds)
 
 
 def tiles(width: int, height: int) -> int:

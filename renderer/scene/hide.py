@@ -7,7 +7,8 @@ from dataclasses import replace
 from renderer.arguments.up import UP_AXES
 from renderer.errors import expect
 from renderer.mesh.cutting import cut
-from renderer.scene.scene import Instance, Scene
+from renderer.scene.instance import Instance
+from renderer.scene.scene import Scene
 
 FLOOR = "floor"
 # A half-space: all that has a coordinate greater, or less, than a number.
@@ -60,4 +61,4 @@ def _cut(instance: Instance, side: str) -> Instance:
     axis, sign, at = _SIDE.fullmatch(side).groups()  # type: ignore[union-attr]
     # Smooth faces keep the normals that they have in the whole.
     mesh = replace(instance.mesh, normals=instance.normals) if instance.smooth else instance.mesh
-    return replace(instance, mesh=cut(mesh, UP_AXES[axis], float(at), below=sign == ">"))
+    return Instance(cut(mesh, UP_AXES[axis], float(at), below=sign == ">"), instance.material, instance.smooth)

@@ -12,9 +12,10 @@ from typing import NamedTuple
 
 from renderer.arguments.counts import count_argument
 from renderer.errors import expect
+from renderer.scene.instance import Instance
 from renderer.scene.light import light_row
 from renderer.scene.material import Phong
-from renderer.scene.scene import Instance, Scene
+from renderer.scene.scene import Scene
 
 # The most faces for which no tree is built. Whole frames of boxes and spheres on a floor, one thread: to test all
 # blocks took 0.72 of the time with a tree for 2 faces, 0.88 for 14, 0.89 for 22, 0.96 for 26, 1.06 to 1.10 for 38, 1.28
@@ -91,7 +92,7 @@ def examine(scene: Scene, max_depth: int | None = None) -> tuple[Finding, ...]:
     phong = {name: m for name, m in used.items() if isinstance(m, Phong)}
     # rule: shining-lights
     shining = sum(any(light_row(light)[4:]) for light in scene.all_lights)
-    faces = sum(len(i.mesh.faces) for i in present)
+    faces = sum(i.faces for i in present)
     receiving = _lit("shadows", "receives direct light", shining, (n for n, m in phong.items() if m.receives_light))
     return (
         _bounce("reflection", "reflects", depth, (n for n, m in used.items() if any(m.reflectance))),
@@ -167,7 +168,7 @@ def lit_materials(scene: Scene) -> list[Phong]:
 
 def _present(scene: Scene) -> list[Instance]:
     """The instances that have faces."""
-    return [i for i in scene.instances if len(i.mesh.faces)]
+    return [i for i in scene.instances if i.faces]
 
 
 def _bounce(feature: str, does: str, depth: int, names: Iterable[str]) -> Finding:
@@ -198,7 +199,7 @@ def _smooth(present: list[Instance]) -> Finding:
 
 
 def _precision(present: list[Instance]) -> Finding:
-    count = sum(not i.mesh.is_float32 for i in present)
+    count = sum(not i.is_float32 for i in present)
     reason = f"float32 does not hold the vertices of {count} meshes" if count else "float32 holds every vertex exactly"
     return Finding("float64_vertices", count > 0, reason)
 

@@ -10,7 +10,6 @@ import os
 import tomllib
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypedDict, Unpack
 
@@ -26,6 +25,7 @@ from renderer.mesh.load import MESH_SUFFIXES, FilePaths, load_mesh, mesh_paths, 
 from renderer.mesh.mesh import Mesh
 from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera, sample_offsets
 from renderer.scene.fields import Color, Fields, FiniteVector, Keys, SceneWarning, first_fault, shown, stated, thrice
+from renderer.scene.instance import Instance
 from renderer.scene.light import DirectionalLight, Light, PointLight
 from renderer.scene.material import Material
 from renderer.scene.showcase import showcase_text
@@ -304,20 +304,6 @@ class Floor(Fields):
         return self
 
 
-@dataclass(frozen=True)
-class Instance:
-    """One mesh in world space with its material's name; ``smooth`` asks for interpolated normals."""
-
-    mesh: Mesh
-    material: str
-    smooth: bool
-
-    @lazy
-    def normals(self) -> NDArray[np.float64]:
-        """The file's own vertex normals, or else the mean of the faces around each vertex, (V, 3) float64."""
-        return self.mesh.normals if self.mesh.normals is not None else self.mesh.vertex_normals()
-
-
 class SceneChanges(TypedDict, total=False):
     """Keyword arguments of ``Scene.altered``."""
 
@@ -453,7 +439,10 @@ class Scene(Fields):
         >>> [(part.material, part.smooth, part.mesh.name) for part in scene.instances]
         [('grey', True, 'icosphere')]
         """
-        placed = [Instance(_placed(o), o.material, o.normals == "smooth") for o in self.objects]
+        # A file that several objects name is one mesh.
+        files = dict.fromkeys(o.mesh for o in self.objects if isinstance(o.mesh, Path))
+        loaded = {file: load_mesh(file) for file in files}
+        placed = [_instance(o, loaded[o.mesh] if isinstance(o.mesh, Path) else o.mesh) for o in self.objects]
         if self.floor is not None:
             placed += [Instance(m, name, False) for m, name in _floor_meshes(self.floor, UP_AXES[self.up])]
         return tuple(placed)
@@ -674,20 +663,8 @@ def warn_of_slips(camera: Camera | None, materials: Mapping[str, Material], wher
             warnings.warn(f"{where}{key}.{slip}", SceneWarning, stacklevel=4)
 
 
-def _loaded(mesh: Path | Mesh) -> Mesh:
-    return mesh if isinstance(mesh, Mesh) else load_mesh(mesh)
-
-
-def _placed(object_: SceneObject) -> Mesh:
-    """The mesh of an object in the world, with split vertices where smooth shading stops at sharp edges."""
-    mesh = _place(_loaded(object_.mesh), object_.matrix())
-    creased = object_.normals == "smooth" and object_.crease < 180.0 and mesh.normals is None
-    return mesh.creased(object_.crease) if creased else mesh
-
-
-def _place(mesh: Mesh, matrix: NDArray[np.float64]) -> Mesh:
-    """``mesh`` in the world, in float64 whatever its file holds; itself where it is not moved."""
-    return mesh if np.array_equal(matrix, np.eye(4)) else mesh.transformed(matrix)
+def _instance(of: SceneObject, mesh: Mesh) -> Instance:
+    return Instance(mesh, of.material, of.normals == "smooth", of.matrix(), of.crease)
 
 
 def _rotation(axis: int, degrees: float) -> NDArray[np.float64]:

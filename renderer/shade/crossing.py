@@ -12,7 +12,7 @@ from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import load, minimum, pointer, store
 from renderer.numerics.vec3 import dot
 from renderer.shade.records import IOR
-from renderer.shade.surface import Look, left_from, lets_through, look_at, scene_pointers
+from renderer.shade.surface import Look, left_from, lets_through, look_at, material_of, scene_pointers
 from renderer.trace.spawn import Place
 from renderer.trace.starts.cone import NUMBER, PATH, holder, make_holders, put_holder
 from renderer.trace.starts.level import NO_MEMBER, Spot, list_members, list_near, member_spot
@@ -68,7 +68,7 @@ def place_at(spot, surface, d):
 @inlined
 def may_coincide(scene, face):
     """Whether a face may coincide with another, one of which transmits light."""
-    return scene.has_touching and load(scene.touching, face) != 0
+    return scene.has_touching and scene.ways.touches(scene, face)
 
 
 @inlined
@@ -115,7 +115,7 @@ def look_together(scene, together, d):
 
 @inlined
 def _material_of(scene, holders, k):
-    return np.int64(load(scene.material, holder(holders, k, NUMBER)))
+    return np.int64(material_of(scene, holder(holders, k, NUMBER)))
 
 
 @inlined

@@ -14,7 +14,7 @@ from renderer.shade.lights import aim, aim_off, see_light
 from renderer.shade.records import DIELECTRIC, KIND, MIRROR, TRANSMITTANCE, UNLIT
 from renderer.shade.surface import bounds_at, lets_through, phong, raised, surface_at
 from renderer.trace.rays import RayPointers
-from renderer.trace.spawn import Facet, Place, put_no_start, put_start, spawn_origin
+from renderer.trace.spawn import Facet, Place, put_all_visible, put_no_start, put_start, spawn_origin
 from renderer.trace.starts.level import Spot
 from renderer.trace.starts.record import ROW, StartPointers
 from renderer.trace.traverse import trace_rays
@@ -30,6 +30,13 @@ _ORIGIN, _DIRECTION, _T_MAX = 0, 3 * SIZE, 6 * SIZE
 # The most faces that light passes on its way to a surface.
 MOST_PANES = 256
 _TOWARDS, _ARRIVING, _START, SHADOW_DOUBLES = 7 * SIZE, 10 * SIZE, 13 * SIZE, (13 + ROW) * SIZE
+
+
+@inlined
+def begin_shadows(shadows):
+    """Let shadow rays hit all instances of a ray scene."""
+    for k in range(SIZE):
+        put_all_visible(offset(shadows, _START + ROW * k))
 
 
 @inlined

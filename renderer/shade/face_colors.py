@@ -7,7 +7,7 @@ from renderer.numerics.simd import load, maximum, minimum, pointer
 from renderer.numerics.vec3 import add, cross, dot, normalized, row3, scale, sub, three, times
 from renderer.shade.lights import see_light
 from renderer.shade.records import AMBIENT
-from renderer.shade.surface import phong, scene_pointers
+from renderer.shade.surface import material_of, phong, scene_pointers
 
 # Equal parts of [0, 1], so narrow that a code is found within a step or two: steps of sRGB are 3e-4 apart and more.
 PLACES = 4096
@@ -28,10 +28,9 @@ def shade_faces(arrays, eye, colors, steps, first, begin, end):
     """Colour the faces from ``begin`` to ``end``; ``steps`` and ``first`` are those of ``face_phong.CodeTable``."""
     seen, steps, first = scene_pointers(arrays), pointer(steps), pointer(first)
     for face in range(begin, end):
-        a, b, c = row3(seen.faces, face)
-        p0, p1, p2 = row3(seen.vertices, a), row3(seen.vertices, b), row3(seen.vertices, c)
+        p0, p1, p2 = seen.ways.corners(seen, seen.ways.at(seen, face))
         p, n = scale(add(add(p0, p1), p2), 1.0 / 3.0), normalized(cross(sub(p1, p0), sub(p2, p0)))
-        d, m = normalized(sub(p, eye)), load(seen.material, face)
+        d, m = normalized(sub(p, eye)), material_of(seen, face)
         n = scale(n, -1.0) if dot(d, n) > 0.0 else n
         color = times(three(seen.materials, m + AMBIENT), row3(seen.colors, 0))
         for light in range(seen.light_count):

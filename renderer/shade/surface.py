@@ -8,10 +8,12 @@ from numpy.typing import NDArray
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import load, minimum, pointer
 from renderer.numerics.vec3 import add, barycentric, dot, largest_component, normalized, row3, scale, sub, three
+from renderer.shade.faces import MERGED, PLACED, FaceWays
 from renderer.shade.records import DIFFUSE, KIND, PHONG, SHININESS, SPECULAR, TRANSMITTANCE
 from renderer.shade.shading import specular
+from renderer.trace.instances import scene_pointers as instance_pointers
 from renderer.trace.spawn import Facet, facet_of, offset_distance
-from renderer.trace.starts.record import corners_of
+from renderer.trace.trees import of_kind
 
 # The most media that a ray remembers to be in. A ninth is not remembered; leaving it then leads back into the eighth.
 MAX_MEDIA = 8
@@ -21,23 +23,26 @@ class SceneArrays(NamedTuple):
     """The arrays of a scene; the columns of materials and lights are those of ``records``.
 
     vertices   (V, 3)
-    normals    (V, 3), no rows if no face is smooth
+    normals    (V, 3), no rows if no face is smooth; (R,) int64 for placed meshes, the addresses of their own
     faces      (F, 3) int32
-    material   (F,) int32, for each face the start of its material's row in the flat array ``materials``
-    smooth     (F,) bool, no rows if no face is smooth
+    placed     empty int64; or uint64, the scene as of ``trace.instances`` in which meshes are placed: then there are no
+               vertices and faces, and R is the number of instances in place of F
+    material   (R,) int32, for each face the start of its material's row in the flat array ``materials``
+    smooth     (R,) bool, no rows if no face is smooth
     materials  (M, MATERIAL_COLUMNS)
     lights     (L, LIGHT_COLUMNS)
     colors     (2, 3), ambient and background
     sky        (4, 3), the unit vector up, and the radiance of zenith, horizon and ground; no rows without a sky
     media      (m,) int64, m <= MAX_MEDIA, the same place for each medium that the eye is in, outermost first
-    touching   (F,) uint8, not 0 for faces that may coincide with one that transmits light; no rows if none does
+    touching   (R,) uint8, not 0 for faces that may coincide with one that transmits light; no rows if none does
     soft       whether the terminator of smooth faces is soft
     clear      whether light passes surfaces that transmit light
     """
 
     vertices: NDArray[np.float64]
-    normals: NDArray[np.float64]
+    normals: NDArray[Any]
     faces: NDArray[np.int32]
+    placed: NDArray[Any]
     material: NDArray[np.int32]
     smooth: NDArray[np.bool_]
     materials: NDArray[np.float64]
@@ -51,13 +56,15 @@ class SceneArrays(NamedTuple):
 
 
 class ScenePointers(NamedTuple):
-    """A ``SceneArrays`` as pointers, with the numbers of lights and of media around the eye, and whether any face is
-    smooth, any touches another and there is a sky.
+    """A ``SceneArrays`` as pointers, with the ``FaceWays``, the numbers of lights and of media around the eye, and
+    whether any face is smooth, any touches another and there is a sky.
     """
 
     vertices: Any
     normals: Any
     faces: Any
+    placed: Any
+    ways: FaceWays
     material: Any
     smooth: Any
     materials: Any
@@ -76,12 +83,25 @@ class ScenePointers(NamedTuple):
 
 
 @inlined
+def _merged(descriptor):
+    return 0, MERGED
+
+
+@inlined
+def _placed(descriptor):
+    return instance_pointers(descriptor), PLACED
+
+
+@inlined
 def scene_pointers(scene):
     """Pointers into a scene, which the caller must keep alive."""
+    placed, ways = of_kind(scene.placed, _merged, _placed)(scene.placed)
     return ScenePointers(
         pointer(scene.vertices),
         pointer(scene.normals),
         pointer(scene.faces),
+        placed,
+        ways,
         pointer(scene.material),
         pointer(scene.smooth),
         pointer(scene.materials),
@@ -136,18 +156,25 @@ def _seen(n_s, n_g, d):
 @inlined
 def look_at(scene, face, u, v, d):
     """The ``Look`` at barycentrics u, v of a face hit by a ray of direction d."""
-    a, b, c = row3(scene.faces, face)
-    p0, p1, p2 = row3(scene.vertices, a), row3(scene.vertices, b), row3(scene.vertices, c)
-    facet = facet_of(p0, p1, p2, d)
+    at, ways = scene.ways.at(scene, face), scene.ways
+    p0, p1, p2 = ways.corners(scene, at)
+    row, facet = ways.row(scene, at), facet_of(p0, p1, p2, d)
     n_s = facet.normal
-    if scene.has_smooth and load(scene.smooth, face):
-        n = barycentric(row3(scene.normals, a), row3(scene.normals, b), row3(scene.normals, c), u, v)
+    if scene.has_smooth and load(scene.smooth, row):
+        n0, n1, n2 = ways.normals(scene, at)
+        n = barycentric(n0, n1, n2, u, v)
         # A file may hold zeros, and opposite normals cancel: a surface without a direction would let light through.
         # rule: unit-shading-normal
         n_s = normalized(n) if largest_component(n) > 0.0 else n_s
         if scene.soft:
             n_s = _seen(n_s, facet.normal, d)
-    return Look(barycentric(p0, p1, p2, u, v), facet, n_s, load(scene.material, face))
+    return Look(barycentric(p0, p1, p2, u, v), facet, n_s, load(scene.material, row))
+
+
+@inlined
+def material_of(scene, face):
+    """The start of the row of a face's material."""
+    return load(scene.material, scene.ways.row(scene, scene.ways.at(scene, face)))
 
 
 class Raised(NamedTuple):
@@ -166,31 +193,30 @@ def raised(scene, face, u, v, p, n, n_g, error):
     Shadow rays from there are not hidden by the faces next to it, of which the smooth surface has none.
     Hanika, Hacking the Shadow Terminator, in Ray Tracing Gems II, 2021.
     """
-    if not (scene.soft and scene.has_smooth and load(scene.smooth, face)):
+    at, ways = scene.ways.at(scene, face), scene.ways
+    if not (scene.soft and scene.has_smooth and load(scene.smooth, ways.row(scene, at))):
         return Raised(p, False)
-    a, b, c = row3(scene.faces, face)
-    up_a, up_b, up_c = _up_to(scene, a, p, n), _up_to(scene, b, p, n), _up_to(scene, c, p, n)
-    up = barycentric(up_a, up_b, up_c, u, v)
+    (p0, p1, p2), (n0, n1, n2) = ways.corners(scene, at), ways.normals(scene, at)
+    up = barycentric(_up_to(p0, n0, p, n), _up_to(p1, n1, p, n), _up_to(p2, n2, p, n), u, v)
     return Raised(add(p, up), abs(dot(up, n_g)) > error)
 
 
 @inlined
-def _up_to(scene, vertex, p, n):
-    """The way from p up to the plane through a vertex across its normal, 0 where p is not below it."""
-    normal = row3(scene.normals, vertex)
+def _up_to(corner, normal, p, n):
+    """The way from p up to the plane through a corner across its normal, 0 where p is not below it."""
     if largest_component(normal) == 0.0:
         return (0.0, 0.0, 0.0)
     normal = normalized(normal)
     outwards = normal if dot(normal, n) > 0.0 else scale(normal, -1.0)
     # rule: soft-terminator
-    height = minimum(dot(sub(p, row3(scene.vertices, vertex)), outwards), 0.0)
+    height = minimum(dot(sub(p, corner), outwards), 0.0)
     return scale(outwards, -height)
 
 
 @inlined
 def bounds_at(scene, face, u, v, p, facet):
     """The ``offset_distance`` and the slack of rays that leave a face at p."""
-    p0, p1, p2 = corners_of(scene.vertices, scene.faces, face, 1.0)
+    p0, p1, p2 = scene.ways.corners(scene, scene.ways.at(scene, face))
     return offset_distance(p, p0, p1, p2, u, v, facet)
 
 

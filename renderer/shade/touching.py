@@ -11,7 +11,6 @@ from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import (
     fabs,
     load,
-    load4,
     lowest_bit,
     maximum,
     minimum,
@@ -21,9 +20,9 @@ from renderer.numerics.simd import (
     store,
 )
 from renderer.numerics.vec3 import largest_of_three, length, sub
-from renderer.shade.surface import lets_through, scene_pointers
+from renderer.shade.surface import lets_through, material_of, scene_pointers
 from renderer.trace.edge_signs import corner
-from renderer.trace.intersect import face_in
+from renderer.trace.intersect import face_in, load_corners
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import octants_around
 from renderer.trace.starts.level import CORNER_ERROR, plane_of
@@ -44,8 +43,8 @@ def mark_touching(descriptor, arrays, begin, end, every, stack, touching):
     tree, scene = tree_pointers(descriptor), scene_pointers(arrays)
     for slot in range(begin, end):
         face = face_in(tree, slot)
-        if face >= 0 and (every or lets_through(scene.materials, np.int64(load(scene.material, face)))):
-            _mark_touched(tree, slot, face, pointer(stack), pointer(touching))
+        if face >= 0 and (every or lets_through(scene.materials, np.int64(material_of(scene, face)))):
+            _mark_touched(tree, scene, slot, face, pointer(stack), pointer(touching))
 
 
 @inlined
@@ -93,23 +92,24 @@ def _box_of(flat):
 
 
 class _Query(NamedTuple):
-    """The search for faces that coincide with one: its ``_Flat``, its number, the corners of its grown box, and a
-    pointer to the marks.
+    """The search for faces that coincide with one: its ``_Flat``, its number, the corners of its grown box, the scene,
+    and a pointer to the marks.
     """
 
     flat: Any
     face: int
     low: tuple
     high: tuple
+    scene: Any
     touching: Any
 
 
 @kernel
-def _mark_touched(tree, slot, face, stack, touching):
+def _mark_touched(tree, scene, slot, face, stack, touching):
     """Mark the face in a place and those that may coincide with it."""
     flat = _flat_at(tree, slot)
     low, high = _box_of(flat)
-    walk(tree, stack, _Query(flat, face, low, high, touching), np.int64(0), _enter, _mark_touched_in)
+    walk(tree, stack, _Query(flat, face, low, high, scene, touching), np.int64(0), _enter, _mark_touched_in)
 
 
 @inlined
@@ -127,31 +127,42 @@ def _mark_touched_in(tree, query, first, blocks, found):
             bits &= bits - 1
             other = face_in(tree, slot)
             if other >= 0 and other != query.face and _may_coincide(query.flat, _corners(tree, slot)):
-                store(query.touching, query.face, np.uint8(1))
-                store(query.touching, other, np.uint8(1))
+                _mark(query, query.face)
+                _mark(query, other)
     return found, False
 
 
 @inlined
-def _coordinates(tree, at_):
-    """A coordinate of a corner of the four faces of a block."""
-    return load4(tree.wide_blocks, at_) if tree.wide != 0 else load4(tree.blocks, at_)
+def _mark(query, face):
+    ways = query.scene.ways
+    store(query.touching, ways.row(query.scene, ways.at(query.scene, face)), np.uint8(1))
+
+
+class _Axes(NamedTuple):
+    """The order of axes in which ``load_corners`` gives coordinates, as rows of a block's corner."""
+
+    row_x: int
+    row_y: int
+    row_z: int
 
 
 @inlined
 def _level_bits(tree, base, flat):
     """The bits of the faces of a block that lie in the plane of a face, or nearly so."""
-    p, n, bits = flat.corners[0], flat.normal, np.int64(0xF)
-    for k in range(3):
-        x = _coordinates(tree, base + 12 * k) - splat4(p[0])
-        y = _coordinates(tree, base + 12 * k + 4) - splat4(p[1])
-        z = _coordinates(tree, base + 12 * k + 8) - splat4(p[2])
-        height = x * splat4(n[0]) + y * splat4(n[1]) + z * splat4(n[2])
-        # As ``level.are_level`` has it, with room to spare.
-        way = maximum(fabs(x), maximum(fabs(y), fabs(z)))
-        error = splat4(2.0 * CORNER_ERROR) * (splat4(flat.largest) + way)
-        bits &= movemask(fabs(height) <= error * (splat4(flat.size) + splat4(flat.side) * way))
-    return bits
+    x0, x1, x2, y0, y1, y2, z0, z1, z2 = load_corners(tree, base, _Axes(0, 4, 8))
+    return _level_corners(flat, x0, y0, z0) & _level_corners(flat, x1, y1, z1) & _level_corners(flat, x2, y2, z2)
+
+
+@inlined
+def _level_corners(flat, x, y, z):
+    """The bits of four corners that lie in the plane of a face, or nearly so."""
+    p, n = flat.corners[0], flat.normal
+    x, y, z = x - splat4(p[0]), y - splat4(p[1]), z - splat4(p[2])
+    height = x * splat4(n[0]) + y * splat4(n[1]) + z * splat4(n[2])
+    # As ``level.are_level`` has it, with room to spare.
+    way = maximum(fabs(x), maximum(fabs(y), fabs(z)))
+    error = splat4(2.0 * CORNER_ERROR) * (splat4(flat.largest) + way)
+    return movemask(fabs(height) <= error * (splat4(flat.size) + splat4(flat.side) * way))
 
 
 @kernel

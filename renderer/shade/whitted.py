@@ -47,6 +47,7 @@ from renderer.shade.direct import (
     POINT,
     SHADOW_DOUBLES,
     SURFACE_DOUBLES,
+    begin_shadows,
     is_lit,
     light_surfaces,
     place_of,
@@ -58,7 +59,7 @@ from renderer.shade.records import AMBIENT, DIELECTRIC, KIND, MIRROR, REFLECTANC
 from renderer.shade.shading import fresnel, reflect, refract
 from renderer.shade.surface import lets_through, look_at, missed, scene_pointers, surface_at
 from renderer.trace.rays import HitPointers, RayPointers
-from renderer.trace.spawn import OffsetRule, Place, put_start, spawn_origin
+from renderer.trace.spawn import OffsetRule, Place, put_all_visible, put_start, spawn_origin
 from renderer.trace.starts.level import Spot
 from renderer.trace.starts.record import ROW, StartPointers
 from renderer.trace.traverse import ScratchPointers, trace_rays
@@ -151,11 +152,15 @@ def bundle_scratch(doubles, integers, hits, settings, trace):
 
 @inlined
 def begin_bundles(scratch, settings):
-    """Set the bounds of all rays, and the initial order of the places."""
+    """Set the bounds of all rays, what they may hit in a ray scene, which is everything, and the order of the places."""
     store(scratch.zero, 0, 0.0)
     store(scratch.infinity, 0, np.inf)
-    for slot in range(settings.max_depth + 4):
-        store(scratch.order, slot, slot)
+    begin_shadows(scratch.shadows)
+    for place in range(settings.max_depth + 4):
+        store(scratch.order, place, place)
+        starts = slot(scratch, settings, place).starts
+        for i in range(SIZE):
+            put_all_visible(offset(starts, i * ROW))
 
 
 @inlined

@@ -85,7 +85,7 @@ TOP_NODES, INSTANCES, INSTANCE_COUNT, FACING, SCENE_WORDS = range(5)
 # An instance in the number of a node or block, and of a slot, four times as large.
 NUMBER_BITS = 32
 _NUMBER = (1 << NUMBER_BITS) - 1
-_SLOT_BITS = NUMBER_BITS + 2
+SLOT_BITS = NUMBER_BITS + 2
 # The entry on a ray's stack where it leaves an instance: the distance -inf, so that no limit passes over it.
 _LEAVE = END + 1
 _LEFT = (-0x800000 << 32) | (_LEAVE & 0xFFFFFFFF)
@@ -277,9 +277,9 @@ def _block_corner(object_, at):
 
 @inlined
 def _face(tree, slot):
-    number = slot >> _SLOT_BITS
+    number = slot >> SLOT_BITS
     _, words = _instance(tree, number)
-    face = load(int32_pointer(load(_object(words), FACES)), slot & ((1 << _SLOT_BITS) - 1))
+    face = load(int32_pointer(load(_object(words), FACES)), slot & ((1 << SLOT_BITS) - 1))
     # rule: faces-of-scene
     return np.int32(load(words, FIRST_FACE) + face) if face >= 0 else np.int32(-1)
 
@@ -293,13 +293,40 @@ def _corners_of_face(tree, starts, face):
 def corners_of_scene_face(tree, face):
     """The placed corners of a face of the scene, as tuples."""
     number = instance_with(tree.words, tree.instance_count, face)
+    return placed_corners(tree, number, face - load(_instance(tree, number)[1], FIRST_FACE))
+
+
+class PlacedFace(NamedTuple):
+    """A face of an instance: the instance's matrix and its object, the numbers of the face's vertices in the mesh, in
+    the order of the placed corners, and whether the matrix mirrors.
+    """
+
+    matrix: Any
+    object_: Any
+    a: int
+    b: int
+    c: int
+    mirrors: bool
+
+
+@inlined
+def placed_face(tree, number, face):
+    """The ``PlacedFace`` of an instance, from 1 on, and the number of a face in its mesh."""
     matrix, words = _instance(tree, number)
-    object_ = _object(words)
-    vertices, unit = float64_pointer(load(object_, VERTICES)), double_of(load(object_, SCALE))
-    a, b, c = row3(int32_pointer(load(object_, MESH_FACES)), face - load(words, FIRST_FACE))
-    if _swapped(words) != 0:
-        b, c = c, b
-    return _placed(matrix, vertices, a, unit), _placed(matrix, vertices, b, unit), _placed(matrix, vertices, c, unit)
+    object_, mirrors = _object(words), _swapped(words) != 0
+    a, b, c = row3(int32_pointer(load(object_, MESH_FACES)), face)
+    return PlacedFace(matrix, object_, a, c if mirrors else b, b if mirrors else c, mirrors)
+
+
+@kernel
+def placed_corners(tree, number, face):
+    """The placed corners of a face of an instance, from 1 on, as tuples."""
+    of = placed_face(tree, number, face)
+    matrix, vertices, unit = of.matrix, float64_pointer(load(of.object_, VERTICES)), double_of(load(of.object_, SCALE))
+    return (
+        _placed(matrix, vertices, of.a, unit), _placed(matrix, vertices, of.b, unit),
+        _placed(matrix, vertices, of.c, unit),
+    )  # fmt: skip
 
 
 @inlined

@@ -30,13 +30,16 @@ from renderer.trace.resolve import LINE, ROUNDING
 from renderer.trace.starts.anchor import anchor_of, far_from, rounded
 from renderer.trace.starts.record import (
     ABOVE,
+    ALL,
     ANCHOR,
     BACK,
     BARYCENTRIC,
     CODE,
     EDGE,
     FACE,
+    IGNORED,
     KNOWN,
+    MASK,
     PILE,
     SLACK,
     THROUGH,
@@ -248,6 +251,13 @@ def put_no_start(row):
     """Write the row of ``starts.record`` for a ray that starts on no surface."""
     store(row, SLACK, 0.0)
     store(row, FACE, -1.0)
+
+
+@inlined
+def put_all_visible(row):
+    """Let the ray of a row of ``starts.record`` hit all instances of a ray scene; the two above leave that as it is."""
+    store(row, MASK, ALL)
+    store(row, IGNORED, -1.0)
 
 
 class _Plane(NamedTuple):

@@ -2,7 +2,6 @@
 
 from typing import Any, NamedTuple
 
-import numba
 from numba import types
 from numba.extending import intrinsic
 
@@ -61,13 +60,13 @@ def _mesh_pointers(descriptor):
 
 
 @intrinsic
-def _way_to_open(typingctx, descriptor):
-    """The kernel that opens a descriptor: scenes have uint64, trees int64."""
-    opens = scene_pointers if descriptor.dtype == types.uint64 else _mesh_pointers
-    return numba.typeof(opens)(descriptor), lambda context, builder, sig, args: context.get_dummy_value()
+def of_kind(typingctx, descriptor, of_tree, of_scene):
+    """The kernel for the kind of a descriptor: scenes have uint64, trees int64."""
+    chosen = of_scene if descriptor.dtype == types.uint64 else of_tree
+    return chosen(descriptor, of_tree, of_scene), lambda context, builder, sig, args: context.get_dummy_value()
 
 
 @inlined
 def tree_pointers(descriptor):
     """The pointers in ``Tree.descriptor``, or that of a scene, whose arrays the caller must keep alive."""
-    return _way_to_open(descriptor)(descriptor)
+    return of_kind(descriptor, _mesh_pointers, scene_pointers)(descriptor)

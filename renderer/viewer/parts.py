@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from renderer.scene.hide import FLOOR, object_names
-from renderer.scene.scene import Instance, Scene
+from renderer.scene.instance import Instance
+from renderer.scene.scene import Scene
 from renderer.viewer.shown import ShownScene
 
 
@@ -22,7 +23,7 @@ class Part(NamedTuple):
 
     @property
     def faces(self) -> int:
-        return sum(len(instance.mesh.faces) for instance in self.instances)
+        return sum(instance.faces for instance in self.instances)
 
     @property
     def bounds(self) -> list[list[float]] | None:

@@ -99,7 +99,7 @@ class ShownScene:
     def brute(self) -> PreparedScene:
         """The same scene with every ray tested against every face."""
         octree = build_octree(self.prepared.mesh, "brute", "midpoint", self.prepared.needs, self.threads)
-        return replace(self.prepared, octree=octree, tree=tree_for(octree, self.prepared.needs))
+        return replace(self.prepared, built=octree, tree=tree_for(octree, self.prepared.needs))
 
 
 def _marks(paths: Iterable[Path]) -> dict[Path, _Mark | None]:

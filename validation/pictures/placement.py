@@ -14,7 +14,8 @@ from scipy.spatial import cKDTree
 from trimesh import transformations
 
 from renderer.mesh.mesh import Mesh
-from renderer.scene.scene import Instance, Scene, SceneObject
+from renderer.scene.instance import Instance
+from renderer.scene.scene import Scene, SceneObject
 from validation.gates import Gate
 
 NAME = "trimesh, files and their places"

@@ -19,7 +19,7 @@ from renderer.trace.leaf import octants_around
 from renderer.trace.starts.anchor import anchor_of
 from renderer.trace.starts.cone import NUMBER, PLACE, ZEROS, add_holder, holder, put_holder
 from renderer.trace.starts.meeting import has_area, height_sign, seen_from, turn_sign, unit_direction
-from renderer.trace.starts.record import BARYCENTRIC, Start, corners_of
+from renderer.trace.starts.record import BARYCENTRIC, Start, corners_in
 from renderer.trace.walk import walk
 
 NO_MEMBER = -1
@@ -152,7 +152,7 @@ def list_members(tree, surfaces, spot, d, holders, count):
     """The ``Members`` at a ``Spot`` hit by a ray of direction d, among those that ``list_near`` listed, at least the
     face of the spot; and the point, for ``member_spot``.
     """
-    corners = corners_of(surfaces.vertices, surfaces.faces, spot.face, tree.scale)
+    corners = corners_in(tree, surfaces, spot.face)
     o = barycentric(corners[0], corners[1], corners[2], spot.u, spot.v)
     met = _SurfacePoint(corners, spot, o, unit_direction(d)[0])
     count = _keep_members(tree, met, holders, count)
@@ -177,15 +177,15 @@ def member_spot(tree, holders, k, spot, met):
 
 
 class _Around(NamedTuple):
-    """The search for touching faces at a point: the point, the room around it, the box of both, the marks of touching
-    faces, and the list of those found.
+    """The search for touching faces at a point: the point, the room around it, the box of both, the surfaces that know
+    which faces touch, and the list of those found.
     """
 
     o: Any
     room: float
     low: Any
     high: Any
-    touching: Any
+    surfaces: Any
     holders: Any
 
 
@@ -194,11 +194,11 @@ def list_near(tree, surfaces, spot, stack, holders):
     """List the touching faces that may contain a spot, as float64 can tell. Returns their number, usually 1. ``stack``
     as in ``search.depart``.
     """
-    corners = corners_of(surfaces.vertices, surfaces.faces, spot.face, tree.scale)
+    corners = corners_in(tree, surfaces, spot.face)
     o = barycentric(corners[0], corners[1], corners[2], spot.u, spot.v)
     room = 4.0 * CORNER_ERROR * largest_of_three(*corners)
     low, high = sub(o, (room, room, room)), add(o, (room, room, room))
-    query = _Around(o, room, low, high, surfaces.touching, holders)
+    query = _Around(o, room, low, high, surfaces, holders)
     return walk(tree, stack, query, np.int64(0), _enter, _list_in)
 
 
@@ -212,7 +212,7 @@ def _list_in(tree, query, first, blocks, count):
     """List the touching faces of some blocks that may contain a point."""
     for slot in range(first * BLOCK_FACES, (first + blocks) * BLOCK_FACES):
         face = face_in(tree, slot)
-        if face >= 0 and load(query.touching, face) != 0:
+        if face >= 0 and query.surfaces.ways.touches(query.surfaces, face):
             place = slot // BLOCK_FACES * BLOCK_WORDS + slot % BLOCK_FACES
             held = _hold_sign(corners_at(tree, place), query.o, query.room)
             if held >= 0:

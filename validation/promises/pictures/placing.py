@@ -12,7 +12,8 @@ from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.material import Phong
-from renderer.scene.scene import Instance, Scene, SceneObject
+from renderer.scene.instance import Instance
+from renderer.scene.scene import Scene, SceneObject
 from validation.promises.row import row
 
 Floats = NDArray[np.float64]

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.scene.camera import primary_rays, sample_offsets
 from renderer.scene.light import DirectionalLight, Light
-from renderer.scene.scene import Instance, Scene
+from renderer.scene.instance import Instance
+from renderer.scene.scene import Scene
 from renderer.scene.sky import Sky
 
 mi.set_variant("scalar_rgb")
@@ -124,7 +125,7 @@ def in_float32(scene: Scene) -> Scene:
 
     A mesh whose shape does not survive that stays as it is, see ``VERTEX_ROUNDING``.
     """
-    rounded = tuple(replace(i, mesh=_in_float32(i.mesh)) for i in scene.instances)
+    rounded = tuple(Instance(_in_float32(i.mesh), i.material, i.smooth) for i in scene.instances)
     return scene.model_copy(update={"instances": rounded})
 
 

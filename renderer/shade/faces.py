@@ -1,0 +1,131 @@
+"""How shading reads the faces of a picture: those of one mesh, or of meshes that stand in its scene many times."""
+
+import math
+from typing import Any, NamedTuple
+
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.double_double import power_below
+from renderer.numerics.simd import float64_pointer, load, maximum
+from renderer.numerics.vec3 import add, cross, largest_component, row3, scale
+from renderer.trace.instances import FIRST_FACE, INSTANCE_WORDS, instance_with, placed_corners, placed_face
+
+# A face of an instance as one number: the instance, from 1 on, above the bits of the face in its mesh.
+_FACE_BITS = 32
+_FACE = (1 << _FACE_BITS) - 1
+# Shorter normals are made longer first, since a power of two near their length may have no reciprocal.
+_SMALL = 2.0**-500
+
+
+class FaceWays(NamedTuple):
+    """The kernels by which faces are read. They are chosen when a picture's kernel is compiled.
+
+    at        at(scene, face): what the others take for a face
+    corners   corners(scene, at): its corners, as tuples
+    normals   normals(scene, at): the normals of its corners, of any length
+    row       row(scene, at): its row of ``material``, ``smooth`` and ``touching``
+    touches   touches(scene, face): whether it may coincide with another, one of which transmits light
+    """
+
+    at: Any
+    corners: Any
+    normals: Any
+    row: Any
+    touches: Any
+
+
+@inlined
+def _face(scene, face):
+    return face
+
+
+@inlined
+def _corners(scene, face):
+    a, b, c = row3(scene.faces, face)
+    return row3(scene.vertices, a), row3(scene.vertices, b), row3(scene.vertices, c)
+
+
+@inlined
+def _normals(scene, face):
+    a, b, c = row3(scene.faces, face)
+    return row3(scene.normals, a), row3(scene.normals, b), row3(scene.normals, c)
+
+
+@inlined
+def _touches(scene, face):
+    return load(scene.touching, scene.ways.row(scene, scene.ways.at(scene, face))) != 0
+
+
+MERGED = FaceWays(_face, _corners, _normals, _face, _touches)
+
+
+@inlined
+def _place(scene, face):
+    number = instance_with(scene.placed.words, scene.placed.instance_count, face)
+    first = load(scene.placed.words, (number - 1) * INSTANCE_WORDS + FIRST_FACE)
+    return (number << _FACE_BITS) | (face - first)
+
+
+@inlined
+def _placed_corners(scene, at):
+    return placed_corners(scene.placed, at >> _FACE_BITS, at & _FACE)
+
+
+@kernel
+def _placed_normals(scene, at):
+    of = placed_face(scene.placed, at >> _FACE_BITS, at & _FACE)
+    # The rows of normals are addresses: each mesh has its own.
+    normals = float64_pointer(load(scene.normals, (at >> _FACE_BITS) - 1))
+    a, b, c = row3(normals, of.a), row3(normals, of.b), row3(normals, of.c)
+    if not _moves(of.matrix):
+        return a, b, c
+    turn = _turn_of(of.matrix, of.mirrors)
+    return _turned(turn, a), _turned(turn, b), _turned(turn, c)
+
+
+@inlined
+def _moves(matrix):
+    """Whether a matrix is not the identity."""
+    moves = False
+    for k in range(12):
+        moves = moves or load(matrix, k) != (1.0 if k % 5 == 0 else 0.0)
+    return moves
+
+
+@inlined
+def _turn_of(matrix, mirrors):
+    """The rows by which ``Mesh.transformed`` turns normals, and the sign: the cofactors of a matrix over a power of two."""
+    largest = 0.0
+    for k in range(12):
+        largest = maximum(largest, abs(load(matrix, k))) if k % 4 != 3 else largest
+    shrink = 0.5 / power_below(largest)
+    x, y, z = _column(matrix, 0, shrink), _column(matrix, 1, shrink), _column(matrix, 2, shrink)
+    return cross(y, z), cross(z, x), cross(x, y), -1.0 if mirrors else 1.0
+
+
+@inlined
+def _column(matrix, j, shrink):
+    return scale((load(matrix, j), load(matrix, 4 + j), load(matrix, 8 + j)), shrink)
+
+
+@inlined
+def _turned(turn, n):
+    """A normal, turned and at unit length, in the order of sums of ``Mesh.transformed``."""
+    x, y, z, sign = turn
+    # rule: turned-normal
+    m = add(add(scale(x, n[0]), scale(y, n[1])), scale(z, n[2]))
+    largest = largest_component(m)
+    if largest == 0.0:
+        return m
+    if largest < _SMALL:
+        m, largest = scale(m, 1.0 / _SMALL), largest / _SMALL
+    u, v, w = scale(m, 1.0 / power_below(largest))
+    length = math.sqrt((u * u + w * w) + v * v)
+    return (sign * (u / length), sign * (v / length), sign * (w / length))
+
+
+@inlined
+def _instance_row(scene, at):
+    return (at >> _FACE_BITS) - 1
+
+
+PLACED = FaceWays(_place, _placed_corners, _placed_normals, _instance_row, _touches)

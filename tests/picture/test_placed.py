@@ -1,0 +1,112 @@
+"""Pictures of scenes in which meshes stand many times, beside those of the merged mesh."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+from renderer import Dielectric, Mesh, Mirror, PerspectiveCamera, Phong, PointLight, Scene, SceneObject, prepare, render
+from renderer.mesh.shapes import box, icosphere
+from renderer.picture import placed
+from renderer.picture.image import PLANES
+from renderer.rayscene.built import BuiltScene
+from tests.cases import cases
+
+pytestmark = pytest.mark.judges("SceneObject", "prepare", "render")
+
+BALL = icosphere(2)
+# Its normals are not those of its faces.
+SMOOTH = Mesh(BALL.vertices * [1, 1, 2], BALL.faces, BALL.vertices + [0.3, 0, 0])
+MATERIALS = {
+    "grey": Phong(diffuse=(0.7, 0.3, 0.1), specular=0.3), "glass": Dielectric(),
+    "tinted": Phong(transmittance=(0.2, 0.8, 0.4), ior=1.2), "mirror": Mirror(reflectance=0.8),
+}  # fmt: skip
+
+
+def scene_of(objects):
+    return Scene(
+        camera=PerspectiveCamera(eye=(0, 1, 9), target=(0, 0, 0)), materials=MATERIALS, objects=objects,
+        lights=[PointLight(position=(2, 5, 4), intensity=40), PointLight(position=(-3, 1, 0), intensity=20)],
+        ambient=0.1, background=(0.2, 0.3, 0.5),
+    )  # fmt: skip
+
+
+def scattered(seed):
+    """Meshes with and without normals, turned, mirrored, sheared by their scales, and some as they are."""
+    rng = np.random.default_rng(seed)
+    still = [SceneObject(mesh=mesh, material="glass", normals="smooth") for mesh in (BALL, SMOOTH)]
+    return still + [
+        SceneObject(
+            mesh=[BALL, SMOOTH, SMOOTH][rng.integers(3)], material=list(MATERIALS)[rng.integers(4)],
+            normals=["flat", "smooth"][rng.integers(2)], crease=30.0, scale=rng.uniform(0.2, 0.8, 3) * rng.choice([-1, 1], 3),
+            rotate=rng.uniform(0, 360, 3), translate=rng.uniform(-3, 3, 3),
+        )
+        for _ in range(30)
+    ]  # fmt: skip
+
+
+def stacked(_):
+    """Boxes of glass that touch, so that rays cross two faces at once, with a glass of water around the eye's place."""
+    cells = [(x, y, z) for x in range(2) for y in range(2) for z in range(3)]
+    glass = ["glass", "tinted", "grey"]
+    return [SceneObject(mesh=box(), material="tinted", scale=20, translate=(-10, -10, -10))] + [
+        SceneObject(mesh=box(), material=glass[k % 3], translate=cell) for k, cell in enumerate(cells)
+    ]
+
+
+@pytest.fixture
+def always(monkeypatch):
+    monkeypatch.setattr(placed, "_LEAST", 1)
+    monkeypatch.setattr("renderer.scene.needs.FEW_FACES", 0)
+
+
+def same_planes(picture, expected):
+    for plane in ("radiance", *PLANES[1:]):
+        np.testing.assert_array_equal(getattr(picture, plane), getattr(expected, plane), err_msg=plane)
+
+
+@cases("make", [scattered, stacked])
+@cases("settings", [{}, {"terminator": "soft", "glass_shadows": "clear", "max_depth": 4}])
+def test_the_picture_has_the_bits_of_that_of_the_merged_mesh(always, make, settings):
+    for seed in range(3):
+        objects = make(seed)
+        box_ = objects[0].mesh
+        objects = [o.model_copy(update={"mesh": box_}) if make is stacked else o for o in objects]
+        scene = scene_of(objects)
+        ready = prepare(scene)
+        assert isinstance(ready.built, BuiltScene)
+        expected = render(scene, accelerator="octree", resolution=60, **settings)
+        same_planes(render(ready, resolution=60, **settings), expected)
+        assert np.array_equal(ready.mesh.triangles, prepare(scene, accelerator="octree").mesh.triangles)
+
+
+def test_copies_and_pickles_render_the_same(always):
+    ready = prepare(scene_of(scattered(7)))
+    expected = render(ready, resolution=40)
+    for again in (copy.deepcopy(ready), pickle.loads(pickle.dumps(ready))):
+        assert isinstance(again.built, BuiltScene)
+        same_planes(render(again, resolution=40), expected)
+
+
+def test_memory_does_not_grow_with_copies():
+    rng = np.random.default_rng(0)
+    sizes = []
+    for count in (20, 400):
+        places = rng.uniform(-3, 3, (count, 3))
+        ball = icosphere(5)
+        mesh = Mesh(ball.vertices, ball.faces, ball.vertices)
+        objects = [
+            SceneObject(mesh=mesh, material="glass", normals="smooth", scale=0.1, translate=place) for place in places
+        ]
+        sizes.append(len(pickle.dumps(prepare(scene_of(objects)))))
+    # Of the merged mesh, a copy has two megabytes of vertices and faces alone.
+    assert sizes[1] - sizes[0] < 380 * 3000
+
+
+def test_what_cannot_be_placed_is_merged(always):
+    flat = [SceneObject(mesh=BALL, material="grey", scale=(1, 1, size)) for size in (0, 0, 1)]
+    assert not isinstance(prepare(scene_of(flat)).built, BuiltScene)
+    far = [SceneObject(mesh=BALL, material="grey", translate=(x, 0, 0)) for x in (1e19, 2e19)]
+    with pytest.raises(ValueError, match="scene: expected a largest coordinate"):
+        prepare(scene_of(far))
