@@ -51,7 +51,7 @@ def stacked(_):
     cells = [(x, y, z) for x in range(2) for y in range(2) for z in range(3)]
     glass = ["glass", "tinted", "grey"]
     return [SceneObject(mesh=box(), material="tinted", scale=20, translate=(-10, -10, -10))] + [
-        SceneObject(mesh=box(), material=glass[k % 3], translate=cell) for k, cell in enumerate(cells)
+        SceneObject(mesh=box(), material=glass[sum(cell) % 3], translate=cell) for k, cell in enumerate(cells)
     ]
 
 
