@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from renderer.arguments.counts import count_argument
 from renderer.checkpoints.parts import Parts, Plan, digest_of
 from renderer.picture.image import PLANES, Image
-from renderer.picture.pack import pack
+from renderer.picture.pack import without_faces
 from renderer.picture.prepare import PreparedScene
 from renderer.picture.render import View
 from renderer.scene.needs import Features
@@ -125,9 +125,11 @@ def checked_band(band: object) -> int:
 
 def digest_of_scene(scene: Scene, needs: Features) -> str:
     """A digest of all that pictures of a scene show, whatever their cameras and settings are."""
-    mesh, arrays = pack(scene, needs)
-    # The media are those around the scene's own camera, which is the view's; around any they depend on how the mesh is
-    # divided into bodies.
-    bodies = np.array([len(instance.mesh.faces) for instance in scene.instances], np.int64)
-    shown = (np.asarray(array) for name, array in arrays._asdict().items() if name != "media")
-    return digest_of(mesh.vertices, mesh.faces, bodies, *shown)
+    # The media are those around the scene's own camera, which is the view's.
+    shown = [np.asarray(array) for name, array in without_faces(scene, needs)._asdict().items() if name != "media"]
+    sources = list({id(instance.source): instance.source for instance in scene.instances}.values())
+    numbers = {id(source): number for number, source in enumerate(sources)}
+    none = np.empty((0, 3))
+    meshes = [a for s in sources for a in (s.vertices, s.faces, none if s.normals is None else s.normals)]
+    stands = [(numbers[id(i.source)], i.smooth, i.crease, *i.matrix.ravel()) for i in scene.instances]
+    return digest_of(*meshes, np.array(stands), *shown)
