@@ -54,7 +54,7 @@ def pixels_of(source: Path | bytes) -> NDArray[Any]:
         with _opened(source) as image:
             # Pillow keeps one byte of two: read as little-endian, the lower one of what is big-endian.
             name, extents, offset, _ = image.tile[0]
-            image.tile = [(name, extents, offset, raw.replace("B", "L"))]  # type: ignore[list-item]
+            image.tile = [(name, extents, offset, f"{raw[:-1]}L")]  # type: ignore[list-item]
             return high << 8 | np.asarray(image)
 
 

@@ -239,8 +239,8 @@ class Mesh:
     ) -> None:
         """Write a binary PLY file, coloured by values if there are any.
 
-        The file appears whole or not at all. It has no parts and no materials. With values, each face or vertex gets a colour, and the value itself as
-        the property ``value``. Values that are not finite are grey.
+        The file appears whole or not at all. It has no parts and no materials. With values, each face or vertex gets a
+        colour, and the value itself as the property ``value``. Values that are not finite are grey.
 
         Parameters
         ----------
