@@ -134,12 +134,12 @@ def _texture(words: list[str], image: Callable[[str], TextureImage | None]) -> t
     scale, offset = (
         [*map(_number, given.get(option, [])), *rest][:2] for option, rest in (("-s", (1, 1)), ("-o", (0, 0)))
     )
-    clamped = given.get("-clamp", [""])[0].lower() == "on"
+    clamped = given.get("-clamp") in (["on"], ["ON"])
     texture = MeshTexture(
         found,
         transform=((scale[0], 0.0, offset[0]), (0.0, scale[1], offset[1])),
         wrap=("clamp", "clamp") if clamped else ("repeat", "repeat"),
-        strength=_number(given.get("-bm", ["1"])[0]),
+        strength=_number("".join(given.get("-bm", ["1"]))),
     )
     return texture, options
 

@@ -42,6 +42,7 @@ def materials_of(
     ``polygons`` has the polygon of each triangle. What no file describes is noted.
     """
     known = _described(looks, reading)
+    # rule: last-use-before
     use = np.searchsorted([first for first, _ in looks.uses], polygons, side="right") - 1
     used = [looks.uses[k][1] for k in np.unique(use[use >= 0]).tolist()]
     missing = [name or "without a name" for name in used if name not in known]
