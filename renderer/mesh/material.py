@@ -84,8 +84,8 @@ class MeshMaterial:
     >>> from renderer import Mesh, MeshMaterial
     >>> red, mask = MeshMaterial("red", base_color=(1, 0, 0)), MeshMaterial("leaf", alpha_mode="mask")
     >>> mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], materials=[red, mask], face_materials=[1])
-    >>> mesh.materials[mesh.face_materials[0]].name
-    'leaf'
+    >>> [material.name for material in mesh.materials], mesh.face_materials
+    (['red', 'leaf'], array([1], dtype=int32))
     """
 
     name: str = ""

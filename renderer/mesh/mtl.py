@@ -134,7 +134,7 @@ def _texture(words: list[str], image: Callable[[str], TextureImage | None]) -> t
     scale, offset = (
         [*map(_number, given.get(option, [])), *rest][:2] for option, rest in (("-s", (1, 1)), ("-o", (0, 0)))
     )
-    clamped = given.get("-clamp") in (["on"], ["ON"])
+    clamped = "".join(given.get("-clamp", [])).lower() == "on"
     texture = MeshTexture(
         found,
         transform=((scale[0], 0.0, offset[0]), (0.0, scale[1], offset[1])),

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
 
 from renderer.arguments.arrays import real_argument
+from renderer.arguments.types import ArrayLike
 from renderer.errors import MeshError, expect
 from renderer.mesh.texture_image import TextureImage
 
@@ -16,7 +18,7 @@ Filter = Literal["linear", "nearest"]
 Row = tuple[float, float, float]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class MeshTexture:
     """An image at the texture coordinates of a mesh.
 
@@ -53,21 +55,27 @@ class MeshTexture:
     filter: Filter = "linear"
     strength: float = 1.0
 
-    def __post_init__(self) -> None:
-        if not isinstance(self.image, TextureImage):
-            object.__setattr__(self, "image", TextureImage(self.image))
+    def __init__(
+        self,
+        image: TextureImage | str | os.PathLike[str] | bytes | ArrayLike,
+        transform: ArrayLike = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+        wrap: tuple[Wrap, Wrap] = ("repeat", "repeat"),
+        filter: Filter = "linear",
+        strength: float = 1.0,
+    ) -> None:
         try:
-            object.__setattr__(self, "transform", numbers("transform", self.transform, (2, 3)))
-            object.__setattr__(self, "strength", numbers("strength", self.strength, ()))
-            wraps = isinstance(self.wrap, tuple | list) and len(self.wrap) == 2
-            expect(
-                wraps and all(each in get_args(Wrap) for each in self.wrap),
-                "wrap", f"two of {', '.join(get_args(Wrap))}", repr(self.wrap),
-            )  # fmt: skip
-            expect(self.filter in get_args(Filter), "filter", "'linear' or 'nearest'", repr(self.filter))
+            rows, factor = numbers("transform", transform, (2, 3)), numbers("strength", strength, ())
+            wraps = isinstance(wrap, tuple | list) and len(wrap) == 2 and all(each in get_args(Wrap) for each in wrap)
+            expect(wraps, "wrap", f"two of {', '.join(get_args(Wrap))}", repr(wrap))
+            expect(filter in get_args(Filter), "filter", "'linear' or 'nearest'", repr(filter))
         except ValueError as error:
             raise MeshError(str(error)) from None
-        object.__setattr__(self, "wrap", tuple(self.wrap))
+        kept = image if isinstance(image, TextureImage) else TextureImage(image)
+        for name, value in zip(_FIELDS, (kept, rows, tuple(wrap), filter, factor), strict=True):
+            object.__setattr__(self, name, value)
+
+
+_FIELDS = ("image", "transform", "wrap", "filter", "strength")
 
 
 def numbers(argument: str, value: Any, shape: tuple[int, ...], least: float = -np.inf, most: float = np.inf) -> Any:
