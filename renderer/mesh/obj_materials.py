@@ -44,7 +44,7 @@ def materials_of(
     known = _described(looks, reading)
     # rule: last-use-before
     use = np.searchsorted([first for first, _ in looks.uses], polygons, side="right") - 1
-    used = [looks.uses[k][1] for k in np.unique(use[use >= 0]).tolist()]
+    used = [looks.uses[k][1] for k in np.flatnonzero(np.bincount(use + 1)[1:]).tolist()]
     missing = [name or "without a name" for name in used if name not in known]
     if missing:
         reading.note("left out: materials that no file describes:", missing)
