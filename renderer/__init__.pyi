@@ -2,9 +2,12 @@ from . import shapes as shapes
 from .errors import MeshError as MeshError
 from .errors import SceneError as SceneError
 from .mesh.load import load_mesh as load_mesh
+from .mesh.material import MeshMaterial as MeshMaterial
 from .mesh.mesh import Mesh as Mesh
 from .mesh.mesh import Repairs as Repairs
 from .mesh.mesh import RepairWarning as RepairWarning
+from .mesh.texture import MeshTexture as MeshTexture
+from .mesh.texture_image import TextureImage as TextureImage
 from .octree import BruteForce as BruteForce
 from .octree import Octree as Octree
 from .picture.image import CutWarning as CutWarning

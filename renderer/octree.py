@@ -272,7 +272,7 @@ class Octree(_Accelerator):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write mesh, tree and ``repairs`` to one file for ``Octree.load``.
 
-        The file appears whole or not at all.
+        The file appears whole or not at all. It has no materials.
 
         Parameters
         ----------

@@ -1,11 +1,16 @@
 """``octree-render info``: what a scene holds, and what its pictures need."""
 
+from __future__ import annotations
+
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from renderer.cli.scene import SPLIT, add_scene
 from renderer.errors import expect
 from renderer.system.terminal import say
+
+if TYPE_CHECKING:
+    from renderer.mesh.material import MeshMaterial
 
 
 def add_info(commands: Any) -> None:
@@ -32,6 +37,8 @@ def _info(options: argparse.Namespace) -> None:
             f"  {instance.mesh.name or 'mesh':<20} {len(instance.mesh.faces):>9} faces  {normals:<7} "
             f"{instance.material} ({material.type})"
         )
+        for own in instance.mesh.materials:
+            say(f"    {_described(own)}")
     findings = examine(scene)
     if features_of(findings).octree:
         stats = Octree.from_mesh(pack(scene)[0], split=options.split).stats
@@ -42,3 +49,13 @@ def _info(options: argparse.Namespace) -> None:
         )
     for feature, value, reason in findings:
         say(f"  {feature.replace('_', ' '):<16} {'needed' if value else 'left out'}: {reason}")
+
+
+def _described(material: MeshMaterial) -> str:
+    """A material of a mesh file and its textures, in a line."""
+    images = ", ".join(
+        f"{field.removesuffix('_texture')} {texture.image.size[0]} x {texture.image.size[1]}"
+        for field, texture in material.textures.items()
+    )
+    color = " ".join(f"{share:.3g}" for share in material.base_color)
+    return f"{material.name or 'material'}: colour {color}, alpha {material.alpha_mode}; textures: {images or 'none'}"

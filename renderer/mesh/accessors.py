@@ -37,6 +37,14 @@ class Accessors:
         values = self._stored(number, self._accessor(number)).astype(np.int64)
         return values[:, 0] if values.shape[1] == 1 else values
 
+    def content(self, number: int) -> bytes:
+        """The bytes of a buffer view, such as those of an image."""
+        view = self._views[number]
+        first, size, buffer = int(view.get("byteOffset", 0)), int(view["byteLength"]), self._buffers[view["buffer"]]
+        if min(first, size) < 0 or first + size > len(buffer):
+            raise MeshError(f"truncated: glTF: buffer view {number} ends beyond its bytes")
+        return buffer[first : first + size]
+
     def _accessor(self, number: int) -> dict[str, Any]:
         if not isinstance(number, int) or not 0 <= number < len(self._accessors):
             raise MeshError(f"glTF: expected an accessor of {len(self._accessors)}, got number {number}")

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.mesh.mesh import Mesh, give_parts
+from renderer.mesh.mesh import Mesh, give_materials, give_parts
 from renderer.mesh.parts import parts_of
 
 Floats = NDArray[np.float64]
@@ -97,5 +97,6 @@ def _made(mesh: Mesh, faces: Ints, owners: Ints, done: _Cut) -> Mesh:
     given = (mesh.normals, mesh.colors, mesh.texcoords)
     normals, colors, texcoords = (None if rows is None else done.values(rows)[used] for rows in given)
     made = Mesh(positions[used], numbers.reshape(-1, 3), normals, colors, texcoords, mesh.name)
+    give_materials(made, mesh.materials, mesh.face_materials, owners)
     ends = np.searchsorted(owners, [part.faces.stop for part in mesh.parts])
     return give_parts(made, parts_of([part.name for part in mesh.parts], np.diff(ends, prepend=0).tolist()))

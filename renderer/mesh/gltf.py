@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, TypeGuard, TypeVar
 from urllib.parse import unquote
@@ -18,7 +19,10 @@ from numpy.typing import NDArray
 
 from renderer.errors import MeshError
 from renderer.mesh.accessors import Accessors
-from renderer.mesh.mesh import Mesh, give_parts
+from renderer.mesh.face_materials import checked_materials
+from renderer.mesh.gltf_materials import Materials
+from renderer.mesh.material import MeshMaterial
+from renderer.mesh.mesh import Mesh, give_materials, give_parts
 from renderer.mesh.parts import parts_of
 from renderer.mesh.placements import Nodes, Placed
 from renderer.mesh.reading import Reading
@@ -41,7 +45,7 @@ _HARMLESS = (
     "KHR_xmp",
 )
 # What of a document has no place in a mesh.
-_LEFT_OUT = ("materials", "textures", "animations", "cameras")
+_LEFT_OUT = ("animations", "cameras")
 
 
 class _Shown(NamedTuple):
@@ -67,43 +71,47 @@ class _Shown(NamedTuple):
 
 
 class _Corners(NamedTuple):
-    """The corners of a primitive: positions, and what else its file gives each."""
+    """The corners of a primitive: positions, and what else its file gives each; and the material of its faces."""
 
     positions: Floats
     faces: NDArray[np.int64]
     attributes: dict[str, Any]
+    material: MeshMaterial | None
 
     def mesh(self, reading: Reading) -> Mesh:
-        return reading.mesh(self.positions, self.faces, **self.attributes)
+        mesh = reading.mesh(self.positions, self.faces, **self.attributes)
+        if self.material is None:
+            return mesh
+        return give_materials(mesh, *checked_materials([self.material], None, len(mesh.faces)))
 
 
-def parse_gltf(content: bytes, reading: Reading, folder: Path | None = None) -> Mesh:
+def parse_gltf(content: bytes, reading: Reading) -> Mesh:
     """All triangle meshes in a file's content, each where its nodes, instances and joints place it.
 
-    Skins stand as the file's nodes are, morph targets by the file's weights. Nodes with meshes are parts. Buffers in
-    files of their own are looked for in ``folder``.
+    Skins stand as the file's nodes are, morph targets by the file's weights. Nodes with meshes are parts. Buffers and
+    images in files of their own are looked for in ``reading.folder``. Faces have the materials of their primitives.
 
     Raises ``MeshError``, which does not know the file's name.
     """
-    return _parsed(content, reading, folder, _merged)
+    return _parsed(content, reading, _merged)
 
 
-def placed_gltf(content: bytes, reading: Reading, folder: Path | None = None) -> list[Placed]:
+def placed_gltf(content: bytes, reading: Reading) -> list[Placed]:
     """The same meshes, each once, with the matrices of the nodes and instances that show it.
 
     A mesh that joints pull is placed. A mesh has the name of its node, or that of the file's mesh if several show it.
     """
-    return _parsed(content, reading, folder, _apart)
+    return _parsed(content, reading, _apart)
 
 
-def _parsed(content: bytes, reading: Reading, folder: Path | None, made: Callable[[list[_Shown], Reading], T]) -> T:
+def _parsed(content: bytes, reading: Reading, made: Callable[[list[_Shown], Reading], T]) -> T:
     """What is made of that which the nodes in a file's content show."""
     document, binary = _document(content)
     try:
         _refuse_unread(document)
-        accessors = Accessors(document, _buffers(document, binary, folder))
+        accessors = Accessors(document, _buffers(document, binary, reading.folder))
         with np.errstate(over="ignore", invalid="ignore"):  # what float64 cannot hold is rejected or repaired
-            shown = list(_shown(document, accessors, reading))
+            shown = list(_shown(document, accessors, Materials(document, accessors, reading), reading))
             found = made(shown, reading)
         left_out = [key for key in _LEFT_OUT if document.get(key)]
         if left_out and any(node.meshes for node in shown):
@@ -190,7 +198,7 @@ def _buffer(number: int, buffer: dict[str, Any], binary: bytes | None, folder: P
         raise MeshError(f"glTF: buffer {number}, {uri[:80]!r}: cannot be read: {error.strerror}") from error
 
 
-def _shown(document: dict[str, Any], accessors: Accessors, reading: Reading) -> Iterator[_Shown]:
+def _shown(document: dict[str, Any], accessors: Accessors, materials: Materials, reading: Reading) -> Iterator[_Shown]:
     """What each node with a mesh shows, in their order."""
     nodes = Nodes(document, accessors)
     known: dict[tuple[Any, ...], list[Mesh]] = {}
@@ -201,7 +209,7 @@ def _shown(document: dict[str, Any], accessors: Accessors, reading: Reading) -> 
         joined = any(nodes.have_joints(number, primitive["attributes"]) for primitive in mesh["primitives"])
         key = ("joints", number) if joined else (node["mesh"], *weights)
         if key not in known:
-            cornered = ((each, _corners(each, weights, accessors, reading)) for each in mesh["primitives"])
+            cornered = ((each, _corners(each, weights, accessors, materials, reading)) for each in mesh["primitives"])
             primitives = [(each["attributes"], corners) for each, corners in cornered if corners is not None]
             known[key] = (
                 list(_pulled(primitives, number, nodes, reading))
@@ -249,16 +257,20 @@ def _apart(shown: list[_Shown], reading: Reading) -> list[Placed]:
 
 
 def _joined(meshes: list[Mesh], reading: Reading, name: str = "") -> Mesh:
-    """One mesh without parts."""
-    for attribute in ("normals", "colors", "texcoords"):
-        having = [getattr(mesh, attribute) is not None for mesh in meshes]
-        if any(having) and not all(having):
-            reading.note(f"left out, as only some primitives have them: {attribute}")
+    """One mesh without parts. Where only some primitives have them, others get white and texture coordinates (0, 0)."""
+    if len({mesh.normals is None for mesh in meshes}) > 1:
+        reading.note("left out, as only some primitives have them: normals")
+    for attribute, width, value in (("colors", 3, 1.0), ("texcoords", 2, 0.0)):
+        lacking = [getattr(mesh, attribute) is None for mesh in meshes]
+        if any(lacking) and not all(lacking):
+            rows: list[Any] = [{attribute: np.full((len(mesh.vertices), width), value)} for mesh in meshes]
+            pairs = zip(meshes, rows, lacking, strict=True)
+            meshes = [replace(mesh, **filled) if lacks else mesh for mesh, filled, lacks in pairs]
     return give_parts(Mesh.concatenate(meshes, name=name), ())
 
 
 def _corners(
-    primitive: dict[str, Any], weights: list[float], accessors: Accessors, reading: Reading
+    primitive: dict[str, Any], weights: list[float], accessors: Accessors, materials: Materials, reading: Reading
 ) -> _Corners | None:
     mode = primitive.get("mode", _TRIANGLES)
     if mode not in (_TRIANGLES, _STRIP, _FAN):
@@ -280,7 +292,8 @@ def _corners(
     if "TEXCOORD_0" in given:
         # From the lower left, where the file counts from the upper.
         attributes["texcoords"] = accessors.floats(given["TEXCOORD_0"]) * [1.0, -1.0] + [0.0, 1.0]
-    return _Corners(positions, _triangles(order, mode), attributes)
+    material = materials.material(primitive.get("material"))
+    return _Corners(positions, _triangles(order, mode), attributes, material)
 
 
 def _triangles(order: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
@@ -304,4 +317,4 @@ def _skinned(corners: _Corners, matrices: Floats) -> _Corners:
         cofactors = np.stack([np.cross(rows[:, 1], rows[:, 2]), np.cross(rows[:, 2], rows[:, 0]),
                               np.cross(rows[:, 0], rows[:, 1])], axis=1)  # fmt: skip
         attributes["normals"] = np.einsum("vij,vj->vi", cofactors, attributes["normals"])
-    return _Corners(moved, corners.faces, attributes)
+    return corners._replace(positions=moved, attributes=attributes)

@@ -40,8 +40,9 @@ def load_mesh(
     """Return the triangle mesh in a .ply, .obj, .stl, .glb or .gltf file.
 
     Polygons are cut into triangles. Normals, colours and texture coordinates of vertices are kept. Groups and objects
-    of OBJ, nodes of glTF and solids of STL are ``parts`` of the mesh. An STL file shares no vertices between its faces.
-    A ``RepairWarning`` names all else that the file has and the mesh has not.
+    of OBJ, nodes of glTF and solids of STL are ``parts`` of the mesh. ``materials`` are those of glTF, of the MTL files
+    that an OBJ file names, and the ``TextureFile`` of PLY; images are decoded when they are first read. An STL file
+    shares no vertices between its faces. A ``RepairWarning`` names all else that the file has and the mesh has not.
 
     Parameters
     ----------
@@ -98,12 +99,15 @@ def load_placed(path: str | os.PathLike[str]) -> list[Placed]:
 
 
 def _loaded(
-    path: str | os.PathLike[str] | bytes | BinaryIO, parse: Callable[..., T], reading: Reading, strict: bool
+    path: str | os.PathLike[str] | bytes | BinaryIO,
+    parse: Callable[[bytes, str, Reading], T],
+    reading: Reading,
+    strict: bool,
 ) -> tuple[T, str]:
     """What is parsed of a file, and the file's name without its suffix. Warns of what was left out."""
-    shown, suffix, content, folder = _read(path)
+    shown, suffix, content, reading.folder = _read(path)
     try:
-        parsed = parse(content, suffix, reading, folder)
+        parsed = parse(content, suffix, reading)
     except MeshError as error:
         raise MeshError(f"{shown}: {error}") from error
     said = reading.said
@@ -111,7 +115,7 @@ def _loaded(
         raise MeshError(f"{shown}: {said}")
     if said:
         warnings.warn(f"{shown}: {said}", RepairWarning, stacklevel=3)
-    return parsed, "" if folder is None else Path(str(shown).removesuffix(".gz")).stem
+    return parsed, "" if reading.folder is None else Path(str(shown).removesuffix(".gz")).stem
 
 
 def _read(path: str | os.PathLike[str] | bytes | BinaryIO) -> tuple[object, str, bytes, Path | None]:
@@ -213,22 +217,22 @@ def _kind(content: bytes) -> str:
     return ".obj" if words and begin[:5].lower() != b"solid" else ".stl"
 
 
-def parse_mesh(content: bytes, suffix: str, reading: Reading | None = None, folder: Path | None = None) -> Mesh:
-    """The mesh in a file's content; ``suffix`` is one of MESH_SUFFIXES, and ``folder`` has the buffers of a .gltf.
+def parse_mesh(content: bytes, suffix: str, reading: Reading | None = None) -> Mesh:
+    """The mesh in a file's content; ``suffix`` is one of MESH_SUFFIXES.
 
     Raises ``MeshError`` as ``load_mesh`` does, without the file's name.
     """
     reading, content = reading or Reading(), _unmarked(content, suffix)
-    mesh = parse_gltf(content, reading, folder) if suffix in Y_UP else _PARSERS[suffix](content, reading)
+    mesh = _PARSERS[suffix](content, reading)
     _expect_faces(len(mesh.faces), reading)
     return mesh
 
 
-def _parse_placed(content: bytes, suffix: str, reading: Reading, folder: Path | None) -> list[Placed]:
+def _parse_placed(content: bytes, suffix: str, reading: Reading) -> list[Placed]:
     """The meshes in a file's content, see ``load_placed``."""
     if suffix not in Y_UP:
-        return [Placed(parse_mesh(content, suffix, reading, folder), np.eye(4)[None], ())]
-    placed = placed_gltf(_unmarked(content, suffix), reading, folder)
+        return [Placed(parse_mesh(content, suffix, reading), np.eye(4)[None], ())]
+    placed = placed_gltf(_unmarked(content, suffix), reading)
     _expect_faces(sum(len(each.mesh.faces) for each in placed), reading)
     return placed
 
@@ -249,9 +253,11 @@ def save_ply(mesh: Mesh, path: str | os.PathLike[str]) -> None:
     write_atomically(path, lambda file: file.write(format_ply(mesh)))
 
 
-_PARSERS: dict[str, Callable[[bytes, Reading], Mesh]] = {".ply": parse_ply, ".obj": parse_obj, ".stl": parse_stl}
+_PARSERS: dict[str, Callable[[bytes, Reading], Mesh]] = {
+    ".ply": parse_ply, ".obj": parse_obj, ".stl": parse_stl, ".glb": parse_gltf, ".gltf": parse_gltf,
+}  # fmt: skip
 # Of glTF, in which y points up by its specification.
 Y_UP = (".glb", ".gltf")
 
 # The suffixes of files that ``load_mesh`` reads.
-MESH_SUFFIXES = (*_PARSERS, *Y_UP)
+MESH_SUFFIXES = tuple(_PARSERS)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar, overload
 
@@ -16,7 +16,9 @@ from renderer.errors import MeshError
 from renderer.lazy import lazy
 from renderer.mesh.crease import Split
 from renderer.mesh.edges import open_edges
+from renderer.mesh.face_materials import checked_materials, joined_materials
 from renderer.mesh.foreign import TriangleMesh, attributes_of, has_own_normals, has_triangles
+from renderer.mesh.material import MeshMaterial
 from renderer.mesh.mending import cancels, enclosed_share, joined, twins
 from renderer.mesh.parts import Part, parts_of
 from renderer.mesh.values import Owner
@@ -101,11 +103,16 @@ class Mesh:
     normals : array_like, shape (V, 3), optional
         Shading normals of any length, kept as float64.
     colors : array_like, shape (V, 3), optional
-        RGB from 0 to 1, kept as float32.
+        RGB from 0 to 1, kept as float32. Those of a glTF file are linear; PLY and OBJ do not say, and most programs
+        write sRGB. They are never converted.
     texcoords : array_like, shape (V, 2), optional
         Texture coordinates from the lower left, kept as float64.
     name : str, default ""
         Begins error messages, and names the part that the mesh becomes in ``Mesh.concatenate``.
+    materials : sequence of MeshMaterial, optional
+        What a file says about the look of its faces, kept as a tuple.
+    face_materials : array_like of int, shape (F,), optional
+        The row of each face's material, -1 where it has none; by default 0. Kept as int32, None without materials.
 
     Raises
     ------
@@ -128,6 +135,8 @@ class Mesh:
     colors: NDArray[np.float32] | None = None
     texcoords: Float64Array | None = None
     name: str = ""
+    materials: tuple[MeshMaterial, ...] = ()
+    face_materials: Int32Array | None = None
     # () for one part, which has the mesh's name.
     _parts: tuple[Part, ...] = field(default=(), repr=False)
 
@@ -139,6 +148,8 @@ class Mesh:
         colors: ArrayLike | None = None,
         texcoords: ArrayLike | None = None,
         name: str = "",
+        materials: Sequence[MeshMaterial] = (),
+        face_materials: ArrayLike | None = None,
         _parts: tuple[Part, ...] = (),
     ) -> None:
         if not isinstance(name, str):
@@ -154,11 +165,16 @@ class Mesh:
             rows = None if values is None else _read_only(_real_rows(name, attribute, values, width, dtype))
             object.__setattr__(self, attribute, rows)
         self._check_attributes()
+        try:
+            give_materials(self, *checked_materials(materials, face_materials, len(self.faces)))
+        except ValueError as error:
+            raise self._error(str(error)) from None
         give_parts(self, _parts)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles are made by the constructor, which checks the arrays and makes them read-only."""
-        return Mesh, (self.vertices, self.faces, self.normals, self.colors, self.texcoords, self.name, self._parts)
+        given = (self.vertices, self.faces, self.normals, self.colors, self.texcoords, self.name)
+        return Mesh, (*given, self.materials, self.face_materials, self._parts)
 
     @classmethod
     def _viewing(cls, arrays: Mapping[str, NDArray[Any]], name: str) -> Mesh:
@@ -171,7 +187,7 @@ class Mesh:
             array = arrays.get(attribute)
             object.__setattr__(mesh, attribute, None if array is None else _read_only(array))
         object.__setattr__(mesh, "name", name)
-        object.__setattr__(mesh, "_parts", ())
+        give_materials(give_parts(mesh, ()), (), None)
         mesh._expect_finite("vertices", mesh.vertices)
         mesh._expect_indices(mesh.faces, len(mesh.vertices))
         mesh._check_attributes()
@@ -223,8 +239,8 @@ class Mesh:
     ) -> None:
         """Write a binary PLY file, coloured by values if there are any.
 
-        The file appears whole or not at all. With values, each face or vertex gets a colour, and the value itself as
-        the property ``value``. Values that are not finite are grey.
+        The file appears whole or not at all. It has no parts and no materials. With values, each face or vertex gets a
+        colour, and the value itself as the property ``value``. Values that are not finite are grey.
 
         Parameters
         ----------
@@ -445,7 +461,7 @@ class Mesh:
         colors, texcoords = (None if a is None else a[split.vertices] for a in (self.colors, self.texcoords))
         normals = means[split.group_of_vertex]
         made = Mesh(self.vertices[split.vertices], split.faces, normals, colors, texcoords, self.name)
-        return give_parts(made, self._parts)
+        return give_parts(give_materials(made, self.materials, self.face_materials), self._parts)
 
     def _mean_normals(self, group: NDArray[np.integer[Any]], count: int) -> Float64Array:
         """The unit normals, (count, 3), of groups of corners; ``group`` has the number of each corner's, (3 F,)."""
@@ -500,6 +516,7 @@ class Mesh:
         colors, texcoords = (None if a is None else a[kept] for a in (self.colors, self.texcoords))
         faces = np.searchsorted(kept, first[self.faces])
         made = Mesh(self.vertices[kept], faces, None, colors, texcoords, self.name)
+        give_materials(made, self.materials, self.face_materials)
         return give_parts(made, self.parts), len(self.vertices) - len(kept)
 
     def without_duplicates(self) -> tuple[Mesh, int]:
@@ -524,6 +541,7 @@ class Mesh:
         _, rows = np.unique(twins(self.vertices, self.faces).number, return_index=True)
         kept = np.sort(rows)
         made = Mesh(self.vertices, self.faces[kept], self.normals, self.colors, self.texcoords, self.name)
+        give_materials(made, self.materials, self.face_materials, kept)
         ends = np.searchsorted(kept, [part.faces.stop for part in self.parts])
         parts = parts_of([part.name for part in self.parts], np.diff(ends, prepend=0).tolist())
         return give_parts(made, parts), len(self.faces) - len(kept)
@@ -658,7 +676,7 @@ class Mesh:
     def concatenate(cls, meshes: Mesh | Iterable[Mesh], *more: Any, name: str = "") -> Mesh:
         """Return one mesh of all vertices and faces, in order, with a part for each mesh.
 
-        Normals, colours and texture coordinates stay only if all the meshes have them.
+        Normals, colours and texture coordinates stay only if all the meshes have them. Equal materials become one.
 
         Parameters
         ----------
@@ -699,6 +717,7 @@ class Mesh:
                 attributes[attribute] = np.concatenate(arrays)
         faces = np.concatenate([part.faces + start for part, start in zip(given, starts, strict=True)])
         mesh = cls(np.concatenate([part.vertices for part in given]), faces, name=name, **attributes)
+        give_materials(mesh, *joined_materials([(p.materials, p.face_materials, len(p.faces)) for p in given]))
         return give_parts(mesh, parts_of([part.name for part in given], [len(part.faces) for part in given]))
 
     @classmethod
@@ -710,6 +729,8 @@ class Mesh:
         colors: ArrayLike | None = None,
         texcoords: ArrayLike | None = None,
         name: str = "",
+        materials: Sequence[MeshMaterial] = (),
+        face_materials: ArrayLike | None = None,
     ) -> tuple[Mesh, Repairs]:
         """Return the mesh of the good faces, in their order, and what was left out.
 
@@ -719,7 +740,7 @@ class Mesh:
 
         Parameters
         ----------
-        vertices, faces, normals, colors, texcoords, name
+        vertices, faces, normals, colors, texcoords, name, materials, face_materials
             As for ``Mesh``.
 
         Returns
@@ -762,13 +783,31 @@ class Mesh:
             if lost.any():
                 given[lost] = cls(positions, indices[kept], name=name).vertex_normals()[lost]
         repairs = Repairs(*(_read_only(np.flatnonzero(rows).astype(np.int64)) for rows in (~kept, ~finite, kept, lost)))
-        return cls(positions, indices[kept], name=name, **attributes), repairs
+        mesh = cls(positions, indices[kept], name=name, **attributes)
+        try:
+            looks = checked_materials(materials, face_materials, len(indices))
+        except ValueError as error:
+            raise _error(name, str(error)) from None
+        return give_materials(mesh, *looks, repairs.kept_faces), repairs
 
 
 def give_parts(mesh: Mesh, parts: tuple[Part, ...]) -> Mesh:
     """The mesh with its parts, while it is being made; parts that do not end with its last face are of another one."""
     fit = bool(parts) and parts[-1].faces.stop == len(mesh.faces)
     object.__setattr__(mesh, "_parts", parts if fit else ())
+    return mesh
+
+
+def give_materials(
+    mesh: Mesh,
+    materials: tuple[MeshMaterial, ...],
+    face_materials: Int32Array | None,
+    kept: NDArray[np.int64] | None = None,
+) -> Mesh:
+    """The mesh with checked materials, while it is being made; ``kept`` are its faces among those that have them."""
+    rows = face_materials if kept is None or face_materials is None else _read_only(face_materials[kept])
+    object.__setattr__(mesh, "materials", materials)
+    object.__setattr__(mesh, "face_materials", rows)
     return mesh
 
 

@@ -7,7 +7,6 @@ face uses (NaN among them), and reorders faces by material.
 from __future__ import annotations
 
 import re
-from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -17,17 +16,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import MeshError
-from renderer.mesh.mesh import Float64Array, Mesh, give_parts
+from renderer.mesh.mesh import Float64Array, Mesh, give_materials, give_parts
+from renderer.mesh.mtl import rest_of
+from renderer.mesh.obj_materials import Looks, materials_of
 from renderer.mesh.parts import Part, runs_of
 from renderer.mesh.polygons import triangulate
-from renderer.mesh.reading import Reading
+from renderer.mesh.reading import Reading, in_utf8
 
 # Statements that say nothing about surfaces.
 _IGNORED = {
     *("g", "o", "s", "l", "p", "mg", "vp", "bevel", "c_interp", "d_interp", "lod", "shadow_obj", "trace_obj"),
 }
+_OF_MATERIALS = ("usemtl", "mtllib")
 # Those that have no place in a mesh, and what a note calls them.
-_LEFT_OUT = dict.fromkeys(("usemtl", "mtllib", "usemap", "maplib"), "materials") | dict.fromkeys(
+_LEFT_OUT = dict.fromkeys(("usemap", "maplib"), "texture maps of the OBJ file itself") | dict.fromkeys(
     ("cstype", "deg", "bmat", "step", "curv", "curv2", "surf", "parm", "trim", "hole", "scrv", "sp", "end", "con",
      "ctech", "stech"), "free-form curves and surfaces"
 )  # fmt: skip
@@ -46,6 +48,7 @@ class _Content:
     corners: NDArray[np.int64]
     starts: NDArray[np.int64]  # polygon p has corners[starts[p] : starts[p + 1]]
     groups: list[_Group]
+    looks: Looks
     left_out: set[str]  # keywords of statements that have no place in a mesh
 
 
@@ -63,26 +66,19 @@ def parse_obj(content: bytes, reading: Reading | None = None) -> Mesh:
     back from what stands before the face. A vertex is split where its faces differ in texture coordinate or normal.
     Where only some faces have texture coordinates, the others get (0, 0); where only some have normals, the normals
     are left out, since they follow from the faces. Vertex colours after the position are kept where every vertex has
-    them. The last ``g`` or ``o`` before a face names its part. Lines and points are ignored. What else is left out is
-    noted: materials, free-form surfaces, unknown statements, indices of normals and texture coordinates that name
-    nothing, faces of fewer than three corners.
+    them. The last ``g`` or ``o`` before a face names its part, the last ``usemtl`` its material, which ``mtllib`` files
+    beside the file describe. Lines and points are ignored. What else is left out is noted: free-form surfaces, unknown
+    statements, indices of normals and texture coordinates that name nothing, faces of fewer than three corners.
 
     Raises ``MeshError`` with the line's number; it does not know the file's name.
     """
     reading = reading or Reading()
-    content = _in_utf8(content)
+    content = in_utf8(content)
     read = _read_common(content)
     read = _read_any(content, reading) if read is None else read
     for what in sorted({_LEFT_OUT[keyword] for keyword in read.left_out}):
         reading.note(f"left out: {what}")
     return _mesh(read, reading)
-
-
-def _in_utf8(content: bytes) -> bytes:
-    """The content, of which UTF-16 is known by its byte order mark."""
-    if content[:2] not in (BOM_UTF16_LE, BOM_UTF16_BE):
-        return content
-    return content.decode("utf-16", "replace").encode()
 
 
 def _parts(content: _Content, polygons: NDArray[np.int64], reading: Reading) -> tuple[Part, ...]:
@@ -96,6 +92,9 @@ def _mesh(content: _Content, reading: Reading) -> Mesh:
     cut = triangulate(content.positions, content.corners[:, 0], content.starts)
     reading.cut((cut.wrong + 1).tolist(), "the number of the face")
     mesh = _split(content, content.corners[cut.places.ravel()], reading)
+    if content.looks.uses or content.looks.libraries:
+        kept = reading.repairs[-1].kept_faces if reading.repairs else None
+        give_materials(mesh, *materials_of(content.looks, cut.polygons, reading), kept)
     return give_parts(mesh, _parts(content, cut.polygons, reading))
 
 
@@ -155,7 +154,7 @@ def _read_common(content: bytes) -> _Content | None:
     found = _blocks(content + b"\n")
     if found is None or not found[0]["v"] or not found[0]["f"]:
         return None
-    blocks, groups, left_out = found
+    blocks, groups, looks, left_out = found
     try:
         position = _table(blocks["v"], b"v", 3)
         texcoord = _table(blocks["vt"], b"vt", 1)
@@ -167,12 +166,14 @@ def _read_common(content: bytes) -> _Content | None:
         return None
     colors = position[:, 3:6] if position.shape[1] >= 6 else None
     texcoord = np.pad(texcoord, ((0, 0), (0, 1)))[:, :2]
-    return _Content(np.ascontiguousarray(position[:, :3]), colors, texcoord, normal[:, :3], *faces, groups, left_out)
+    return _Content(
+        np.ascontiguousarray(position[:, :3]), colors, texcoord, normal[:, :3], *faces, groups, looks, left_out
+    )
 
 
-def _blocks(content: bytes) -> tuple[dict[str, bytes], list[_Group], set[str]] | None:
-    """All lines of each keyword that matters, end to end; the groups; and the keywords of what is left out. None if any
-    other line is not certain to be ignored.
+def _blocks(content: bytes) -> tuple[dict[str, bytes], list[_Group], Looks, set[str]] | None:
+    """All lines of each keyword that matters, end to end; groups; materials; and the keywords of what is left out. None
+    if any other line is not certain to be ignored.
     """
     letters = np.frombuffer(content, np.uint8)
     ends = np.flatnonzero(letters == ord("\n")) + 1
@@ -187,13 +188,15 @@ def _blocks(content: bytes) -> tuple[dict[str, bytes], list[_Group], set[str]] |
         "f": (first == ord("f")) & blank,
     }
     rest = ~np.logical_or.reduce([*rows.values(), first == ord("#"), first == ord("\n")])
-    groups, left_out, before = [], set(), np.cumsum(rows["f"])
+    groups, looks, left_out, before = [], Looks(), set(), np.cumsum(rows["f"])
     for start, end, polygons in zip(starts[rest].tolist(), ends[rest].tolist(), before[rest].tolist(), strict=True):
         keyword = content[start:end].split(None, 1)[:1]
         if content[start : start + 1] != b"\r":
             word = keyword[0].decode("latin-1") if keyword else ""
             if word in _LEFT_OUT:
                 left_out.add(word)
+            elif word in _OF_MATERIALS:
+                looks.read(word, rest_of(content[start:end].decode("utf-8", "replace")), polygons)
             elif word not in _IGNORED:
                 return None
         if keyword in ([b"g"], [b"o"]):
@@ -205,7 +208,7 @@ def _blocks(content: bytes) -> tuple[dict[str, bytes], list[_Group], set[str]] |
         changes = np.flatnonzero(np.diff(chosen, prepend=False, append=False))
         edges = np.append(starts, len(content))[changes].tolist()
         blocks[name] = b"".join([content[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True)])
-    return blocks, groups, left_out
+    return blocks, groups, looks, left_out
 
 
 def _table(block: bytes, keyword: bytes, least: int) -> Float64Array:
@@ -270,6 +273,7 @@ class _Statements:
     corners: list[tuple[int, int, int]] = field(default_factory=list)
     lengths: list[int] = field(default_factory=list)
     groups: list[_Group] = field(default_factory=list)
+    looks: Looks = field(default_factory=Looks)
     left_out: set[str] = field(default_factory=set)
     unknown: list[str] = field(default_factory=list)
 
@@ -281,6 +285,9 @@ def _read_any(content: bytes, reading: Reading) -> _Content:
         # The rest is a comment, at the end of a statement too, which many programs write.
         words = line.partition("#")[0].split()
         if not words:
+            continue
+        if words[0] in _OF_MATERIALS:  # whose names may have a #
+            statements.looks.read(words[0], rest_of(line), len(statements.lengths))
             continue
         try:
             if any("_" in word for word in words) and words[0] in (
@@ -306,6 +313,7 @@ def _read_any(content: bytes, reading: Reading) -> _Content:
         np.array(statements.corners, np.int64).reshape(-1, 3),
         np.cumsum([0, *statements.lengths]),
         statements.groups,
+        statements.looks,
         statements.left_out,
     )
 

@@ -15,9 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import MeshError
+from renderer.mesh.material import MeshMaterial
 from renderer.mesh.mesh import Float64Array, Mesh
 from renderer.mesh.polygons import triangulate
 from renderer.mesh.reading import Reading
+from renderer.mesh.texture import MeshTexture
 
 _TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
@@ -72,8 +74,8 @@ def parse_ply(content: bytes, reading: Reading | None = None) -> Mesh:
     (-1 restarts a strip; every second triangle is turned; stitching triangles without area stay), in the file's
     order. Vertex normals, colours (red, green, blue; integers are
     divided by 255 or by their type's maximum) and texture coordinates (s t, u v or texture_u texture_v) are
-    kept. Other properties and elements are left out and noted, as are faces of fewer than three corners, header lines
-    of no meaning and bytes behind the last element.
+    kept; a comment ``TextureFile`` gives a material. Other properties and elements are left out and noted, as are faces
+    of fewer than three corners, header lines of no meaning and bytes behind the last element.
 
     Raises ``MeshError``, which does not know the file's name.
     """
@@ -88,14 +90,27 @@ def parse_ply(content: bytes, reading: Reading | None = None) -> Mesh:
     faces = [
         _strips(corners) if name == "tristrips" else _polygons(corners, positions, reading) for name, corners in lists
     ]
-    texcoords = (_vertex_columns(vertex, names) for names in _TEXCOORD_NAMES)
+    pairs = (_vertex_columns(vertex, names) for names in _TEXCOORD_NAMES)
+    texcoords = next((pair for pair in pairs if pair is not None), None)
     return reading.mesh(
         positions,
         np.concatenate([np.empty((0, 3), np.int64), *faces]),
         normals=_vertex_columns(vertex, _NORMAL),
         colors=_colors(vertex, reading),
-        texcoords=next((pair for pair in texcoords if pair is not None), None),
+        texcoords=texcoords,
+        materials=_texture_file(content, texcoords is not None, reading),
     )
+
+
+def _texture_file(content: bytes, has_texcoords: bool, reading: Reading) -> list[MeshMaterial]:
+    """A material with the image that a comment ``TextureFile`` names, as MeshLab writes; none without that."""
+    header = content[: content.find(b"end_header", 0, _MAX_HEADER_BYTES)]
+    names = re.findall(r"(?m)^comment TextureFile[ \t]+(\S.*?)\s*$", header.decode("utf-8", "replace"))
+    if names and (not has_texcoords or len(names) > 1):
+        reading.note("left out, as vertices have no texture coordinates in one image: textures", names)
+    elif names and (image := reading.image_file(names[0])) is not None:
+        return [MeshMaterial(base_color_texture=MeshTexture(image), double_sided=True)]
+    return []
 
 
 def _vertices(content: bytes, reading: Reading) -> tuple[dict[str, _Columns], list[_Element]]:

@@ -30,8 +30,8 @@ WHOLE: dict[str, Any] = {
 BESIDE: dict[str, Any] = {"side": {"leaving": THREE}, "bounds": {"spacing": 1}}
 OCTREE = Octree(CORNERS, [[0, 1, 2], [0, 2, 1]])  # closed, as some ask
 HITS = OCTREE.closest_hit(THREE, UP)
-# These are never made float64: the corners of faces, masks and numbers of objects.
-UNROUNDED = {"faces", "mask", "through"}
+# These are never made float64: the corners and materials of faces, masks and numbers of objects.
+UNROUNDED = {"faces", "face_materials", "mask", "through"}
 
 
 def public() -> dict[str, Any]:

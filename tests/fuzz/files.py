@@ -110,6 +110,23 @@ def _ply(text: bool, byte_order: str) -> bytes:
     return out.getvalue()
 
 
+_IMAGE = b"P6 2 1 255 abcdef"
+# Beside the file of materials that is mutated.
+_OF_MTL = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\n"
+_MTL = """newmtl a
+Kd 0.5 0 1
+Ks 1
+Ns 20
+Tr 0.25
+map_Kd -s 2 2 1 -clamp on a.ppm
+newmtl b
+illum 7
+Ni 1.5
+Tf 1 0.5 0
+map_bump -bm 0.5 a.ppm
+"""
+
+
 def _gltf() -> bytes:
     """A triangle of normalized bytes, twice by instances, and one that a joint would pull, in a document of text."""
     data = struct.pack("<9b3x4B4f6f16f", *(0, 0, 0, 127, 0, 0, 0, 127, 0), 0, 0, 0, 0, 1, 0, 0, 0, *(0, 0, 0, 2, 0, 0),
@@ -124,8 +141,17 @@ def _gltf() -> bytes:
         "nodes": [{"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 3}}}},
                   {"mesh": 1, "skin": 0, "children": [2], "scale": [1, 2, 1]}, {"translation": [0, 0, 1]}],
         "skins": [{"joints": [2], "inverseBindMatrices": 4}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]},
-                   {"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]},
+                   {"primitives": [{"attributes": {"POSITION": 0}, "material": 1}]}],
+        "materials": [
+            {"name": "a", "pbrMetallicRoughness": {"baseColorFactor": [1, 0.5, 0, 1], "baseColorTexture": {"index": 0}},
+             "normalTexture": {"index": 0, "scale": 0.5, "texCoord": 0, "extensions": {
+                 "KHR_texture_transform": {"offset": [0, 1], "rotation": 0.5, "scale": [2, 1]}}}},
+            {"alphaMode": "MASK", "alphaCutoff": 0.25, "emissiveFactor": [0, 1, 0], "doubleSided": True,
+             "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_unlit": {}}},
+        ],
+        "textures": [{"source": 0, "sampler": 0}], "samplers": [{"wrapS": 33071, "magFilter": 9728}],
+        "images": [{"uri": "data:;base64," + base64.b64encode(_IMAGE).decode()}],
         "accessors": accessors, "bufferViews": views,
         "buffers": [{"byteLength": len(data), "uri": "data:;base64," + base64.b64encode(data).decode()}],
     }  # fmt: skip
@@ -148,6 +174,7 @@ def _seeds() -> dict[str, bytes]:
         "text.stl": foreign.export(file_type="stl_ascii").encode(),
         "a.glb": trimesh.Scene(foreign).export(file_type="glb"),
         "a.gltf": _gltf(),
+        "a.mtl": _MTL.encode(),
         "scene.toml": SCENE.encode(),
     }
 
@@ -221,7 +248,7 @@ def mutated(name: str, seed: int, index: int) -> bytes:
     content = SEEDS[name]
     for _ in range(rng.choice([1, 1, 1, 2, 4])):
         head, mark, body = content.partition(b"end_header\n")
-        if name in ("ascii.ply", "plain.obj", "text.stl", "a.gltf", "scene.toml"):
+        if name in ("ascii.ply", "plain.obj", "text.stl", "a.gltf", "a.mtl", "scene.toml"):
             content = (mutate_text if rng.random() < 0.8 else mutate_bytes)(rng, content)
         elif mark and rng.random() < 0.3:
             content = mutate_text(rng, head) + mark + body
@@ -250,10 +277,23 @@ def _mutate_glb_text(rng: Random, content: bytes) -> bytes:
 # --- checks ---------------------------------------------------------------------------------------------------
 
 
+def check_materials(mesh: Mesh) -> None:
+    """Each face has one or none, and each image its pixels or one clear error."""
+    for material in mesh.materials:
+        for texture in material.textures.values():
+            try:
+                assert texture.image.pixels.shape[:2] == texture.image.size[::-1]
+            except MeshError as error:
+                assert "\n" not in str(error)
+    rows = [-1] if mesh.face_materials is None else mesh.face_materials
+    assert min(rows) >= -1 and max(rows) < len(mesh.materials)
+
+
 def check_mesh(mesh: Mesh, rng: np.random.Generator) -> bool:
     """Valid arrays, and the octree's hits are brute force's, each finite or a miss. False: no octree may be built."""
     assert len(mesh.faces) > 0 and mesh.faces.min() >= 0 and mesh.faces.max() < len(mesh.vertices)
     assert np.isfinite(mesh.vertices).all()
+    check_materials(mesh)
     if len(mesh.faces) > MOST_TRACED:
         return True
     try:
@@ -332,6 +372,7 @@ def check(path: Path, content: bytes, index: int) -> str:
     Anything wrong is an exception: AssertionError, TimeoutError, or whatever the reader let through.
     """
     path.write_bytes(content)
+    path = path.with_name("of_mtl.obj") if path.suffix == ".mtl" else path
     rng = np.random.default_rng(index)
     with warnings.catch_warnings(), time_limit(SECONDS):
         warnings.simplefilter("error")
@@ -347,7 +388,7 @@ def check(path: Path, content: bytes, index: int) -> str:
                 check_mesh(instance.mesh, rng)
             return "loaded"
         check_mesh(loaded, rng)
-    count = COUNTERS.get(path.suffix, lambda _: None)(content)
+    count = COUNTERS.get(path.suffix, lambda _: None)(path.read_bytes())
     assert count is None or len(loaded.faces) in count, f"a silent drop: {len(loaded.faces)} triangles of {count}"
     return "loaded" if count is None else "counted"
 
@@ -356,6 +397,8 @@ def prepare(folder: Path) -> None:
     """Put beside the inputs what they refer to, and compile the kernels before a clock starts."""
     check_mesh(box(), np.random.default_rng(0))
     (folder / "box.ply").write_bytes(format_ply(box()))
+    (folder / "of_mtl.obj").write_text(_OF_MTL)
+    (folder / "a.ppm").write_bytes(_IMAGE)
 
 
 def _kind(name: str) -> Kind:

@@ -26,7 +26,11 @@ OBJ = {
     "free-form curves": (
         f"{V}{F}cstype bezier\ndeg 3\ncurv 0 1 1 2 3 4\nend\n", "left out: free-form curves and surfaces",
     ),
-    "materials": (f"mtllib a.mtl\n{V}usemtl red\n{F}", "left out: materials"),
+    "materials": (
+        f"mtllib a.mtl\n{V}usemtl red\n{F}",
+        "left out: material files that are not there: a.mtl; left out: materials that no file describes: red",
+    ),
+    "maps of its own": (f"maplib a\n{V}usemap b\n{F}", "left out: texture maps of the OBJ file itself"),
     "a face of two corners": (f"{V}f 1 2\n{F}f 3\n", "left out: faces of fewer than three corners"),
     "a normal that is not there": (V + F.replace("f 1 ", "f 1//7 "), "left out: normal indices that name nothing"),
     "texture index 0": (V + F.replace("f 1 ", "f 1/0 "), "left out: texture indices that name nothing"),

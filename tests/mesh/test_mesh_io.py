@@ -339,7 +339,8 @@ def test_obj_index_faults(tmp_path: Path, text: str, message: str) -> None:
 
 # Statements of which most files made of them are of the common shape, and those that never are.
 COMMON = ["v 0.1 -2e-3 +.5", "v 1 0 0", "v\t3  7 1.", "vt 0.25 1", "vt .5 .5", "vn 0 0 1", "f 1 2 3", "f 1\t2 3 1 ",
-          "f 01 3 2", "# f 1 2", "g a b", "usemtl x", "", "s off", "vp 1 2", "#", "l 1 2"]  # fmt: skip
+          "f 01 3 2", "# f 1 2", "g a b", "usemtl x", "usemtl a #1", "mtllib a  b#.mtl", "", "s off", "vp 1 2", "#",
+          "l 1 2"]  # fmt: skip
 SLASHED = ["f 1/1/1 2/2/1 3/1/1", "f 1/1/1 3/2/2 2/1/1 1/1/1", "f 2/1/1 3/1/1 1/2/1"]
 ODD = [
     "f 1/1/1 2 3/1", "f 1 2/1/1 3/1", "f 1 2//1 3",
@@ -362,7 +363,7 @@ def read_both(content: bytes) -> bool:
     for name, value in vars(obj._read_any(content, Reading())).items():
         other = getattr(common, name)
         assert (value is None) == (other is None), name
-        if name in ("groups", "left_out"):
+        if name in ("groups", "looks", "left_out"):
             assert value == other
         elif value is not None:
             assert value.shape == other.shape and value.dtype == other.dtype, name

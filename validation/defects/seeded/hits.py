@@ -121,6 +121,10 @@ _CHANGES: dict[str, Change] = {
     "bounds of t lose the dimensions of the rays": Rule("bounds-in-shape", choice(otherwise="_.ravel()")),
     "a loaded tree forgets its repairs": Rule("repairs-of-file", value("None")),
     "normals of OBJ files of which some corners have one": Rule("all-have-normals", call("all", "_self.any()")),
+    "a material of an OBJ file begins a face late": Rule(
+        "last-use-before", call("searchsorted", "np.searchsorted(_0, _1)")
+    ),
+    "textures of glTF files turn the other way": Rule("turned-with-v-up", element(1, "(-_[0], _[1], _[2])")),
     "a face that holds a start is hit from there": Rule("met-once", compare(">=")),
     "faces beside a start are met from where it is rounded to": Rule("beside-start", value("np.int64(0)")),
     "a ray passes faces that coincide all at once": Rule("coincident-order", value("False")),

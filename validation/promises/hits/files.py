@@ -1,5 +1,7 @@
-"""Mesh files by convention: corners and indices of OBJ, colours and strips of PLY."""
+"""Mesh files by convention: corners, indices and materials of OBJ, colours and strips of PLY, textures of glTF."""
 
+import base64
+import json
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -38,6 +40,18 @@ end_header
 6 1 0
 5 2 0
 """
+# A triangle and an image of 1 x 1 (PPM).
+_FLOATS = np.array([0, 0, 0, 1, 0, 0, 0, 1, 0], "<f4").tobytes()
+_TEXTURED: dict[str, Any] = {
+    "asset": {"version": "2.0"},
+    "nodes": [{"mesh": 0}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
+    "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+    "bufferViews": [{"buffer": 0, "byteLength": len(_FLOATS)}],
+    "buffers": [{"byteLength": len(_FLOATS), "uri": "data:;base64," + base64.b64encode(_FLOATS).decode()}],
+    "textures": [{"source": 0}],
+    "images": [{"uri": "data:;base64," + base64.b64encode(b"P6 1 1 255 abc").decode()}],
+}
 
 
 def check_files(rng: Generator) -> list[dict[str, Any]]:
@@ -51,6 +65,8 @@ def check_files(rng: Generator) -> list[dict[str, Any]]:
             row("every second triangle of a PLY strip is flipped, also after a restart", _JUDGE, _strips(folder)),
             row("an index below 0 in an OBJ file counts back from its face", "known answer", _back(folder, rng)),
             row("colours of a PLY file are shares of the largest of their type", "known answer", _shares(folder)),
+            row("a face of an OBJ file has the material that was used last before it", _JUDGE, _materials(folder, rng)),
+            row("transforms of a glTF file's texture coordinates hold where v points up", _JUDGE, _moved(folder, rng)),
         ]
 
 
@@ -148,4 +164,42 @@ def _shares(folder: Path) -> NDArray[np.bool_]:
         found = load_mesh(path).colors
         assert found is not None
         kept.append((found[:, :3] == (colors / largest).astype(np.float32)).ravel())
+    return np.concatenate(kept)
+
+
+def _materials(folder: Path, rng: Generator) -> NDArray[np.bool_]:
+    """Quadrangles and triangles between materials, whose red is their number; before the first there is none."""
+    kept = []
+    (folder / "a.mtl").write_text("".join(f"newmtl m{k}\nKd {k / 8} 0 0\n" for k in range(8)), encoding="ascii")
+    for count in _SIZES:
+        lines, expected, last = ["mtllib a.mtl"], [], -1
+        for polygon in rng.permuted(["f 1 2 4 3", "f 1 2 3"] * count).tolist():
+            if rng.random() < 0.3:
+                last = int(rng.integers(8))
+                lines.append(f"usemtl m{last}")
+            lines.append(polygon)
+            expected += [last] * (len(polygon.split()) - 3)
+        (folder / "a.obj").write_text(_CORNERS + "\n".join(lines) + "\n", encoding="ascii")
+        mesh = load_mesh(folder / "a.obj")
+        reds = np.array([*(8 * material.base_color[0] for material in mesh.materials), -1.0])
+        found = -np.ones(len(mesh.faces)) if mesh.face_materials is None else reds[mesh.face_materials]
+        kept.append(found == np.array(expected))
+    return np.concatenate(kept)
+
+
+def _moved(folder: Path, rng: Generator) -> NDArray[np.bool_]:
+    """Scaled, turned counter-clockwise to an eye that sees v point down, and offset: by complex numbers."""
+    kept = []
+    for _ in range(32):
+        (x, y), (width, height), turn = rng.uniform(-2, 2, 2), rng.uniform(0.1, 3, 2), rng.uniform(-4, 4)
+        moved = {"offset": [x, y], "scale": [width, height], "rotation": turn}
+        use = {"index": 0, "extensions": {"KHR_texture_transform": moved}}
+        path = folder / "a.gltf"
+        path.write_text(json.dumps(_TEXTURED | {"materials": [{"normalTexture": use}]}), encoding="ascii")
+        texture = load_mesh(path).materials[0].normal_texture
+        assert texture is not None
+        at = rng.uniform(-1, 1, 2)
+        place = complex(at[0] * width, -at[1] * height) * np.exp(1j * turn) + complex(x, -y)
+        found = np.array(texture.transform) @ [at[0], 1.0 - at[1], 1.0]
+        kept.append(np.abs(found - [place.real, 1.0 + place.imag]) < 1e-12)
     return np.concatenate(kept)
