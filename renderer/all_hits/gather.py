@@ -149,7 +149,6 @@ def _edges_at(tree, block, hits, i, shear, resolved):
     hit, edges = hit_in(hits, i), np.int64(0)
     if (hits.uncertain >> i) & 1 != 0 or hit.u == 0.0 or hit.v == 0.0 or hit.u + hit.v == hit.w:
         edges = _edges_passed(exact_sides(tree, block * BLOCK_WORDS + i, shear))
-        # rule: edges-at-start
         if edges == _ALL_EDGES:
             # A ray in the face's plane hits it where it begins alone, and the weights there say on which edges.
             u, v = resolved.u == 0.0, resolved.v == 0.0

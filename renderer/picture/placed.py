@@ -37,8 +37,8 @@ def placed(scene: Scene, split: Literal["midpoint", "sah"], threads: int) -> Bui
     trees = {key: Octree.from_mesh(mesh, split=split, threads=threads).tree for key, mesh in sources.items()}
     members, transforms = list[Member](), list[NDArray[np.float64]]()
     for mesh, matrices in stands:
-        built = Built(mesh, trees[id(mesh)])
-        members.append(Member(len(members), "", built, len(transforms), len(matrices)))
+        own = Built(mesh, trees[id(mesh)])
+        members.append(Member(len(members), "", own, len(transforms), len(matrices)))
         transforms += matrices
     flags = np.full(len(transforms), MASK_BITS)
     try:
@@ -65,8 +65,7 @@ def _stands(scene: Scene) -> Iterator[tuple[Mesh, list[NDArray[np.float64]]]]:
 
 
 def placed_arrays(scene: Scene, needs: Features, built: BuiltScene) -> SceneArrays:
-    """What the kernel reads beside ``built``, with the addresses of the normals of smooth meshes, which ``scene`` keeps.
-    """
+    """What the kernel reads beside ``built``; ``scene`` keeps the normals of smooth meshes, which have addresses here."""
     smooth = [i.smooth and needs.smooth_normals for i in scene.instances]
     own = [_normals(i).ctypes.data if is_smooth else 0 for i, is_smooth in zip(scene.instances, smooth, strict=True)]
     return without_faces(scene, needs)._replace(normals=np.array(own, np.int64), placed=built.top.descriptor)

@@ -68,7 +68,7 @@ class PreparedScene:
     built: Octree | BruteForce | BuiltScene
     needs: Features
     arrays: SceneArrays
-    tree: Tree | SceneTree
+    tree: Any
     build_seconds: float
 
     @property

@@ -22,9 +22,7 @@ def find_touching(tree: Tree | SceneTree, arrays: SceneArrays, needs: Features, 
     return arrays._replace(touching=touching_faces(tree, arrays, threads)) if needs.refraction else arrays
 
 
-def touching_faces(
-    tree: Tree | SceneTree, arrays: SceneArrays, threads: int, every: bool = False
-) -> NDArray[np.uint8]:
+def touching_faces(tree: Tree | SceneTree, arrays: SceneArrays, threads: int, every: bool = False) -> NDArray[np.uint8]:
     """``SceneArrays.touching``; with ``every``, whether or not one of two faces passes light."""
     touching = np.zeros(len(arrays.material), np.uint8)
     for first, count in _slots(tree):

@@ -93,7 +93,7 @@ def _moves(matrix):
 
 @inlined
 def _turn_of(matrix, mirrors):
-    """The rows by which ``Mesh.transformed`` turns normals, and the sign: the cofactors of a matrix over a power of two."""
+    """The rows by which ``Mesh.transformed`` turns normals, which are cofactors over a power of two, and the sign."""
     largest = 0.0
     for k in range(12):
         largest = maximum(largest, abs(load(matrix, k))) if k % 4 != 3 else largest
@@ -111,7 +111,6 @@ def _column(matrix, j, shrink):
 def _turned(turn, n):
     """A normal, turned and at unit length, in the order of sums of ``Mesh.transformed``."""
     x, y, z, sign = turn
-    # rule: turned-normal
     m = add(add(scale(x, n[0]), scale(y, n[1])), scale(z, n[2]))
     largest = largest_component(m)
     if largest == 0.0:

@@ -10,7 +10,6 @@ import numpy as np
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import (
     fabs,
-    load,
     lowest_bit,
     maximum,
     minimum,

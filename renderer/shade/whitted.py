@@ -152,7 +152,7 @@ def bundle_scratch(doubles, integers, hits, settings, trace):
 
 @inlined
 def begin_bundles(scratch, settings):
-    """Set the bounds of all rays, what they may hit in a ray scene, which is everything, and the order of the places."""
+    """Set the bounds of all rays, let them hit all that a ray scene has, and set the order of the places."""
     store(scratch.zero, 0, 0.0)
     store(scratch.infinity, 0, np.inf)
     begin_shadows(scratch.shadows)

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.judges("SceneObject", "prepare", "render")
 
 BALL = icosphere(2)
 # Its normals are not those of its faces.
-SMOOTH = Mesh(BALL.vertices * [1, 1, 2], BALL.faces, BALL.vertices + [0.3, 0, 0])
+SMOOTH = Mesh(BALL.vertices * [1, 1, 2], BALL.faces, np.add(BALL.vertices, [0.3, 0, 0]))
 MATERIALS = {
     "grey": Phong(diffuse=(0.7, 0.3, 0.1), specular=0.3), "glass": Dielectric(),
     "tinted": Phong(transmittance=(0.2, 0.8, 0.4), ior=1.2), "mirror": Mirror(reflectance=0.8),
@@ -39,8 +39,8 @@ def scattered(seed):
     return still + [
         SceneObject(
             mesh=[BALL, SMOOTH, SMOOTH][rng.integers(3)], material=list(MATERIALS)[rng.integers(4)],
-            normals=["flat", "smooth"][rng.integers(2)], crease=30.0, scale=rng.uniform(0.2, 0.8, 3) * rng.choice([-1, 1], 3),
-            rotate=rng.uniform(0, 360, 3), translate=rng.uniform(-3, 3, 3),
+            normals=["flat", "smooth"][rng.integers(2)], crease=30.0,
+            scale=rng.uniform(0.2, 0.8, 3) * rng.choice([-1, 1], 3), rotate=rng.uniform(0, 360, 3), translate=rng.uniform(-3, 3, 3),
         )
         for _ in range(30)
     ]  # fmt: skip

@@ -11,8 +11,8 @@ from trimesh.transformations import compose_matrix
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
 from renderer.scene.camera import PerspectiveCamera
-from renderer.scene.material import Phong
 from renderer.scene.instance import Instance
+from renderer.scene.material import Phong
 from renderer.scene.scene import Scene, SceneObject
 from validation.promises.row import row
 

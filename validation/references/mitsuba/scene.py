@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.scene.camera import primary_rays, sample_offsets
-from renderer.scene.light import DirectionalLight, Light
 from renderer.scene.instance import Instance
+from renderer.scene.light import DirectionalLight, Light
 from renderer.scene.scene import Scene
 from renderer.scene.sky import Sky
 
