@@ -40,7 +40,8 @@ def scattered(seed):
         SceneObject(
             mesh=[BALL, SMOOTH, SMOOTH][rng.integers(3)], material=list(MATERIALS)[rng.integers(4)],
             normals=["flat", "smooth"][rng.integers(2)], crease=30.0,
-            scale=rng.uniform(0.2, 0.8, 3) * rng.choice([-1, 1], 3), rotate=rng.uniform(0, 360, 3), translate=rng.uniform(-3, 3, 3),
+            scale=rng.uniform(0.2, 0.8, 3) * rng.choice([-1, 1], 3), rotate=rng.uniform(0, 360, 3),
+            translate=rng.uniform(-3, 3, 3),
         )
         for _ in range(30)
     ]  # fmt: skip
