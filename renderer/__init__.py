@@ -6,7 +6,7 @@ The public names::
         load_mesh            a mesh from a .ply, .obj, .stl or .glb file
         Mesh                 vertices and triangles; its faults raise MeshError
         Repairs              what ``Mesh.repaired`` left out; ``load_mesh`` warns of it with RepairWarning
-        MeshMaterial         what a file says about the look of faces, with its MeshTexture and TextureImage
+        MeshMaterial         what a file says about the look of faces, with its Texture and TextureImage
         shapes               meshes of simple shapes: box, grid, icosphere, torus
 
     Queries

@@ -6,7 +6,7 @@ from .mesh.material import MeshMaterial as MeshMaterial
 from .mesh.mesh import Mesh as Mesh
 from .mesh.mesh import Repairs as Repairs
 from .mesh.mesh import RepairWarning as RepairWarning
-from .mesh.texture import MeshTexture as MeshTexture
+from .mesh.texture import Texture as Texture
 from .mesh.texture_image import TextureImage as TextureImage
 from .octree import BruteForce as BruteForce
 from .octree import Octree as Octree

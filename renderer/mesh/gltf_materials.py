@@ -12,7 +12,7 @@ from renderer.errors import MeshError
 from renderer.mesh.accessors import Accessors
 from renderer.mesh.material import MeshMaterial
 from renderer.mesh.reading import Reading
-from renderer.mesh.texture import MeshTexture, Wrap
+from renderer.mesh.texture import Texture, Wrap
 from renderer.mesh.texture_image import TextureImage
 
 _WRAPS: dict[Any, Wrap] = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
@@ -76,7 +76,7 @@ class Materials:
             unlit="KHR_materials_unlit" in extensions,
         )
 
-    def _texture(self, use: dict[str, Any] | None, strength: str = "") -> MeshTexture | None:
+    def _texture(self, use: dict[str, Any] | None, strength: str = "") -> Texture | None:
         """The texture of a material's entry, whose key ``strength`` says how much it counts."""
         if use is None:
             return None
@@ -90,7 +90,7 @@ class Materials:
         if image is None:
             return None
         sampler = self._document["samplers"][texture["sampler"]] if "sampler" in texture else {}
-        return MeshTexture(
+        return Texture(
             image,
             transform=_transform(moved),
             wrap=(_WRAPS[sampler.get("wrapS", 10497)], _WRAPS[sampler.get("wrapT", 10497)]),

@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 from renderer.arguments.arrays import flag_argument
 from renderer.errors import MeshError, expect
-from renderer.mesh.texture import MeshTexture, numbers
+from renderer.mesh.texture import Texture, numbers
 
 AlphaMode = Literal["opaque", "mask", "blend"]
 Color = tuple[float, float, float]
@@ -31,11 +31,11 @@ class MeshMaterial:
         As the file has it.
     base_color : array_like, shape (3,), default (1, 1, 1)
         From 0 to 1: ``baseColorFactor``, ``Kd``.
-    base_color_texture : MeshTexture, optional
+    base_color_texture : Texture, optional
         Its alpha, if it has any, multiplies ``alpha``: ``map_Kd``.
     alpha : float, default 1
         From 0 to 1: ``d``.
-    alpha_texture : MeshTexture, optional
+    alpha_texture : Texture, optional
         The alpha of the image, or its grey if it has none: ``map_d``.
     alpha_mode : {"opaque", "mask", "blend"}, default "opaque"
         Alpha is ignored, compared with ``alpha_cutoff``, or the share of the surface that is there.
@@ -43,19 +43,19 @@ class MeshMaterial:
         A mask is there where alpha is at least this.
     metallic, roughness : float, default 0 and 1
         From 0 to 1: ``Pm`` and ``Pr`` of MTL.
-    metallic_roughness_texture : MeshTexture, optional
+    metallic_roughness_texture : Texture, optional
         Green is roughness, blue metallic.
-    normal_texture, bump_texture : MeshTexture, optional
+    normal_texture, bump_texture : Texture, optional
         Normals in tangent space, or heights: ``norm`` and ``map_Bump``.
-    occlusion_texture : MeshTexture, optional
+    occlusion_texture : Texture, optional
         Red is the share of ambient light.
     emissive : array_like, shape (3,), default (0, 0, 0)
         At least 0: ``emissiveFactor`` times its strength, ``Ke``.
-    emissive_texture : MeshTexture, optional
+    emissive_texture : Texture, optional
         ``map_Ke``.
     specular : array_like, shape (3,), optional
         At least 0, ``Ks``. None for a material that has no highlights of Phong.
-    specular_texture : MeshTexture, optional
+    specular_texture : Texture, optional
         ``map_Ks``.
     shininess : float, optional
         The exponent of highlights, ``Ns``.
@@ -90,21 +90,21 @@ class MeshMaterial:
 
     name: str = ""
     base_color: Color = (1.0, 1.0, 1.0)
-    base_color_texture: MeshTexture | None = None
+    base_color_texture: Texture | None = None
     alpha: float = 1.0
-    alpha_texture: MeshTexture | None = None
+    alpha_texture: Texture | None = None
     alpha_mode: AlphaMode = "opaque"
     alpha_cutoff: float = 0.5
     metallic: float = 0.0
     roughness: float = 1.0
-    metallic_roughness_texture: MeshTexture | None = None
-    normal_texture: MeshTexture | None = None
-    bump_texture: MeshTexture | None = None
-    occlusion_texture: MeshTexture | None = None
+    metallic_roughness_texture: Texture | None = None
+    normal_texture: Texture | None = None
+    bump_texture: Texture | None = None
+    occlusion_texture: Texture | None = None
     emissive: Color = (0.0, 0.0, 0.0)
-    emissive_texture: MeshTexture | None = None
+    emissive_texture: Texture | None = None
     specular: Color | None = None
-    specular_texture: MeshTexture | None = None
+    specular_texture: Texture | None = None
     shininess: float | None = None
     ambient: Color | None = None
     mirror: bool = False
@@ -136,16 +136,16 @@ class MeshMaterial:
         expect(self.alpha_mode in modes, "alpha_mode", f"one of {', '.join(modes)}", repr(self.alpha_mode))
         for field in TEXTURES:
             value = getattr(self, field)
-            expect(value is None or isinstance(value, MeshTexture), field, "a MeshTexture or None", repr(value))
+            expect(value is None or isinstance(value, Texture), field, "a Texture or None", repr(value))
 
     @property
-    def textures(self) -> dict[str, MeshTexture]:
+    def textures(self) -> dict[str, Texture]:
         """The textures that there are, by the names of their fields.
 
         Examples
         --------
-        >>> from renderer import MeshMaterial, MeshTexture
-        >>> MeshMaterial(normal_texture=MeshTexture("bricks.png")).textures.keys()
+        >>> from renderer import MeshMaterial, Texture
+        >>> MeshMaterial(normal_texture=Texture("bricks.png")).textures.keys()
         dict_keys(['normal_texture'])
         """
         return {field: getattr(self, field) for field in TEXTURES if getattr(self, field) is not None}

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from renderer.mesh.material import MeshMaterial
-from renderer.mesh.texture import MeshTexture
+from renderer.mesh.texture import Texture
 from renderer.mesh.texture_image import TextureImage
 
 _COLORS = {"kd": "base_color", "ks": "specular", "ka": "ambient", "ke": "emissive", "tf": "transmission_color"}
@@ -116,7 +116,7 @@ def _give(entry: _Entry, name: str, value: Any) -> None:
     entry.fields[name] = value
 
 
-def _texture(words: list[str], image: Callable[[str], TextureImage | None]) -> tuple[MeshTexture | None, list[str]]:
+def _texture(words: list[str], image: Callable[[str], TextureImage | None]) -> tuple[Texture | None, list[str]]:
     """The texture of a map's words, and its options that are not read."""
     given: dict[str, list[str]] = {}
     while len(words) > 1 and words[0].lower() in _OPTIONS:
@@ -135,7 +135,7 @@ def _texture(words: list[str], image: Callable[[str], TextureImage | None]) -> t
         [*map(_number, given.get(option, [])), *rest][:2] for option, rest in (("-s", (1, 1)), ("-o", (0, 0)))
     )
     clamped = "".join(given.get("-clamp", [])).lower() == "on"
-    texture = MeshTexture(
+    texture = Texture(
         found,
         transform=((scale[0], 0.0, offset[0]), (0.0, scale[1], offset[1])),
         wrap=("clamp", "clamp") if clamped else ("repeat", "repeat"),

@@ -19,7 +19,7 @@ from renderer.mesh.material import MeshMaterial
 from renderer.mesh.mesh import Float64Array, Mesh
 from renderer.mesh.polygons import triangulate
 from renderer.mesh.reading import Reading
-from renderer.mesh.texture import MeshTexture
+from renderer.mesh.texture import Texture
 
 _TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
@@ -109,7 +109,7 @@ def _texture_file(content: bytes, has_texcoords: bool, reading: Reading) -> list
     if names and (not has_texcoords or len(names) > 1):
         reading.note("left out, as vertices have no texture coordinates in one image: textures", names)
     elif names and (image := reading.image_file(names[0])) is not None:
-        return [MeshMaterial(base_color_texture=MeshTexture(image), double_sided=True)]
+        return [MeshMaterial(base_color_texture=Texture(image), double_sided=True)]
     return []
 
 

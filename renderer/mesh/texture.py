@@ -19,7 +19,7 @@ Row = tuple[float, float, float]
 
 
 @dataclass(frozen=True, init=False)
-class MeshTexture:
+class Texture:
     """An image at the texture coordinates of a mesh.
 
     Parameters
@@ -43,8 +43,8 @@ class MeshTexture:
 
     Examples
     --------
-    >>> from renderer import MeshTexture
-    >>> brick = MeshTexture("brick.png", transform=[[4, 0, 0], [0, 2, 0]], wrap=("repeat", "clamp"))
+    >>> from renderer import Texture
+    >>> brick = Texture("brick.png", transform=[[4, 0, 0], [0, 2, 0]], wrap=("repeat", "clamp"))
     >>> brick.image, brick.transform
     (TextureImage('brick.png'), ((4.0, 0.0, 0.0), (0.0, 2.0, 0.0)))
     """

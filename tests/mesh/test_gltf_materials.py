@@ -13,7 +13,7 @@ import trimesh
 from cases import cases
 from glb_bytes import Glb
 
-from renderer import Mesh, MeshError, MeshMaterial, MeshTexture, RepairWarning, load_mesh
+from renderer import Mesh, MeshError, MeshMaterial, RepairWarning, Texture, load_mesh
 from renderer.mesh.load import load_placed
 
 pytestmark = pytest.mark.judges("load_mesh")
@@ -44,7 +44,7 @@ def read(entry: dict[str, Any], **document: Any) -> MeshMaterial:
     return load_mesh(glb([entry], **document), strict=True).materials[0]
 
 
-def textured(info: dict[str, Any], sampler: dict[str, Any] | None = None) -> MeshTexture:
+def textured(info: dict[str, Any], sampler: dict[str, Any] | None = None) -> Texture:
     document: dict[str, Any] = {"textures": [{"source": 0}], "images": [{"uri": URI}]}
     if sampler is not None:
         document = {**document, "textures": [{"source": 0, "sampler": 0}], "samplers": [sampler]}

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from cases import cases
 
-from renderer import Mesh, MeshError, MeshMaterial, MeshTexture, TextureImage
+from renderer import Mesh, MeshError, MeshMaterial, Texture, TextureImage
 from renderer.mesh.cutting import cut
 from renderer.mesh.shapes import box
 
-pytestmark = pytest.mark.judges("Mesh", "MeshMaterial", "MeshMaterial.textures", "MeshTexture")
+pytestmark = pytest.mark.judges("Mesh", "MeshMaterial", "MeshMaterial.textures", "Texture")
 
 IMAGE = TextureImage([[0.0, 1.0]])
-RED, WOOD = MeshMaterial("red", base_color=(1, 0, 0)), MeshMaterial("wood", base_color_texture=MeshTexture(IMAGE))
+RED, WOOD = MeshMaterial("red", base_color=(1, 0, 0)), MeshMaterial("wood", base_color_texture=Texture(IMAGE))
 CUBE = box()
 # The material of a face follows from where it is: none, red or wood at z = 0, between and at 1.
 HEIGHTS = CUBE.triangles[..., 2].mean(axis=1)
@@ -95,7 +95,7 @@ def test_bad_rows_are_named(materials: Any, rows: Any, message: str) -> None:
         ({"shininess": "much"}, "shininess: expected real numbers, got dtype"),
         ({"alpha_mode": "glass"}, "alpha_mode: expected one of opaque, mask, blend, got 'glass'"),
         ({"unlit": 1}, "unlit: expected True or False, got 1"),
-        ({"bump_texture": "a.png"}, "bump_texture: expected a MeshTexture or None, got 'a.png'"),
+        ({"bump_texture": "a.png"}, "bump_texture: expected a Texture or None, got 'a.png'"),
     ],
 )
 def test_bad_fields_of_a_material_are_named(fields: dict[str, Any], message: str) -> None:
@@ -117,11 +117,11 @@ def test_bad_fields_of_a_material_are_named(fields: dict[str, Any], message: str
 )
 def test_bad_fields_of_a_texture_are_named(fields: dict[str, Any], message: str) -> None:
     with pytest.raises(MeshError) as refused:
-        MeshTexture(IMAGE, **fields)
+        Texture(IMAGE, **fields)
     assert str(refused.value).startswith(message)
 
 
 def test_materials_hash_by_value_and_list_their_textures() -> None:
-    same = MeshMaterial("wood", base_color=np.ones(3), base_color_texture=MeshTexture(IMAGE))  # type: ignore[arg-type]
+    same = MeshMaterial("wood", base_color=np.ones(3), base_color_texture=Texture(IMAGE))  # type: ignore[arg-type]
     assert same == WOOD and hash(same) == hash(WOOD) and same.base_color == (1.0, 1.0, 1.0)
-    assert RED.textures == {} and WOOD.textures == {"base_color_texture": MeshTexture(IMAGE)}
+    assert RED.textures == {} and WOOD.textures == {"base_color_texture": Texture(IMAGE)}

@@ -112,7 +112,7 @@ HITS = {
     "refits": Check(check_refits, ("Octree.refit",)),
     "trees": Check(lambda: check_trees(_random()), ("Octree", "Octree.tree", "Octree.refit")),
     "counts": Check(lambda: check_counts(_random()), ("Octree.stats", "Octree.from_mesh", *_of_both("count_steps"))),
-    "mesh files": Check(lambda: check_files(_random()), ("load_mesh", "MeshMaterial", "MeshTexture")),
+    "mesh files": Check(lambda: check_files(_random()), ("load_mesh", "MeshMaterial", "Texture")),
     "kept arrays": Check(
         lambda: check_kept(_random()), ("Mesh", "Octree", "BruteForce", "Octree.save", "Octree.load", "Octree.refit")
     ),
