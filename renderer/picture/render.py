@@ -8,7 +8,8 @@ from typing import Any, Literal, NamedTuple, Unpack
 from renderer.errors import expect
 from renderer.picture.image import PLANES, CutWarning, Image
 from renderer.picture.prepare import MediaRule, PreparedScene, prepare_scene, tiles
-from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
+from renderer.scene.camera import Camera
+from renderer.scene.cameras.base import BaseCamera
 from renderer.scene.needs import Features, checked_needs
 from renderer.scene.scene import GivenSettings, RenderSettings, Scene, checked_settings
 from renderer.system.terminal import progress_bar
@@ -38,7 +39,7 @@ def render(
     scene : Scene or PreparedScene
         The scene. What ``prepare`` returns for one saves its preparation: the tree, and all else that does not depend
         on the camera or the settings.
-    camera : PerspectiveCamera or OrthographicCamera, optional
+    camera : PerspectiveCamera, OrthographicCamera or another of the cameras, optional
         Another camera than the scene's.
     accelerator : {"auto", "octree", "brute"}, default "auto"
         The octree, or a test of every ray against every face. "auto" takes the octree unless there are very few faces.
@@ -173,8 +174,8 @@ def checked_view(
 ) -> View:
     """The checked view of the arguments of ``render``. Raises ``ValueError`` naming the argument."""
     eye = source.camera if camera is None else camera
-    expect(isinstance(eye, PerspectiveCamera | OrthographicCamera), "camera", "a camera", type(camera).__name__)
-    chosen = checked_settings(source.render, settings)
+    expect(isinstance(eye, BaseCamera), "camera", "a camera", type(camera).__name__)
+    chosen = checked_settings(source.render, settings, eye)
     try:
         kept: tuple[Any, ...] = (planes,) if isinstance(planes, str) else tuple(planes)
     except TypeError:  # also of what claims to be iterable and is not
