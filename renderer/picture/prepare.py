@@ -12,10 +12,11 @@ from renderer.jit.notice import Stopwatch
 from renderer.lazy import lazy
 from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
+from renderer.picture.camera_rays import rays_of_tiles
 from renderer.picture.image import PLANES, Image
 from renderer.picture.pack import media_around, pack
 from renderer.picture.touching import find_touching, touching_faces
-from renderer.scene.camera import Camera, sample_offsets
+from renderer.scene.camera import Camera
 from renderer.scene.needs import Features
 from renderer.scene.scene import RenderSettings, Scene
 from renderer.shade.bundle import SIZE
@@ -111,7 +112,7 @@ class PreparedScene:
         clock = Stopwatch()
         width, height = chosen.resolution
         first_row, end_row = (0, height) if band is None else band
-        rows, samples = camera.rows(width, height), sample_offsets(chosen.samples)
+        rays_of = rays_of_tiles(camera, (width, height), chosen.samples)
         settings = kernel_settings_of(self.needs, chosen, offset, media)
         arrays = arrays_for(self, camera, offset, media)
         arrays = arrays._replace(soft=chosen.terminator == "soft", clear=chosen.glass_shadows == "clear")
@@ -121,8 +122,8 @@ class PreparedScene:
             x, y = first % across * TILE, first_row + first // across * TILE
             tall, wide = film.radiance.shape[:2]
             tile = Rectangle(x, y, min(x + TILE, wide), min(y + TILE, tall))
-            scratch = tile_scratch(self.tree.depth, settings, _bundles_in_a_row(self.tree))
-            while not render_tile(self.tree.descriptor, arrays, settings, rows, samples, film, tile, scratch):
+            scratch, rays = tile_scratch(self.tree.depth, settings, _bundles_in_a_row(self.tree)), rays_of(tile)
+            while not render_tile(self.tree.descriptor, arrays, settings, rays, film, tile, scratch):
                 yield
             cut[first] = scratch.state[CUT]
 

@@ -6,13 +6,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.scene.cameras.base import BaseCamera
+from renderer.scene.cameras.equirectangular import EquirectangularCamera
+from renderer.scene.cameras.fisheye import FisheyeCamera
+from renderer.scene.cameras.opencv_fisheye import OpenCVFisheyeCamera
 from renderer.scene.cameras.orthographic import OrthographicCamera
 from renderer.scene.cameras.perspective import PerspectiveCamera
 from renderer.scene.cameras.pinhole import PinholeCamera
+from renderer.scene.cameras.thin_lens import ThinLensCamera
 
-__all__ = ["Camera", "OrthographicCamera", "PerspectiveCamera", "PinholeCamera", "primary_rays", "sample_offsets"]
+__all__ = [
+    "Camera",
+    "EquirectangularCamera",
+    "FisheyeCamera",
+    "OpenCVFisheyeCamera",
+    "OrthographicCamera",
+    "PerspectiveCamera",
+    "PinholeCamera",
+    "ThinLensCamera",
+    "primary_rays",
+    "sample_offsets",
+]
 
-Camera = PerspectiveCamera | OrthographicCamera | PinholeCamera
+Camera = (
+    PerspectiveCamera
+    | OrthographicCamera
+    | PinholeCamera
+    | FisheyeCamera
+    | OpenCVFisheyeCamera
+    | EquirectangularCamera
+    | ThinLensCamera
+)
 
 
 def sample_offsets(samples: int) -> NDArray[np.float64]:

@@ -19,7 +19,7 @@ from renderer.arguments.limits import FARTHEST
 from renderer.arguments.points import check_points
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
-from renderer.numerics.film_rays import affine_rays, along
+from renderer.numerics.film_rays import affine_rays, along, unit_rows
 from renderer.scene.fields import Fields, FiniteVector
 from renderer.scene.vectors import unit
 
@@ -216,6 +216,20 @@ class BaseCamera(Fields):
         """The film positions of points (n, 3), NaN for those that no ray reaches."""
         raise NotImplementedError
 
+    def _has_lens(self, samples: int) -> bool:
+        """Whether the samples of a pixel, if there are so many, start at different points of a lens."""
+        return False
+
+    def _rows_for(self, width: int, height: int, samples: int) -> Floats | None:
+        """The rows of the map from film to rays if that is affine for so many samples of a pixel."""
+        return None
+
+    def _sample_rays(
+        self, x: Floats, y: Floats, width: int, height: int, number: int, samples: int
+    ) -> tuple[Floats, Floats]:
+        """``_rays`` of the sample with this number; for ``samples`` itself, those through the middle of a lens."""
+        return self._rays(x, y, width, height)
+
     def _resolution(self, resolution: int | Sequence[int] | None) -> tuple[int, int]:
         """The checked width and height."""
         given = self.film_size if resolution is None else resolution
@@ -255,6 +269,9 @@ class AffineCamera(BaseCamera):
     def _rays(self, x: Floats, y: Floats, width: int, height: int) -> tuple[Floats, Floats]:
         return affine_rays(self.rows(width, height), x, y)
 
+    def _rows_for(self, width: int, height: int, samples: int) -> Floats | None:
+        return None if self._has_lens(samples) else self.rows(width, height)
+
 
 class CentralCamera(AffineCamera):
     """An affine camera whose rays all start at its eye."""
@@ -266,3 +283,26 @@ class CentralCamera(AffineCamera):
         s = along(away, np.cross(across, down))
         s[~(s > 0.0)] = np.nan
         return along(away, np.cross(down, corner)) / s, along(away, np.cross(corner, across)) / s
+
+
+class AngularCamera(BaseCamera):
+    """A camera whose rays all start at its eye, in directions that are not affine in the film position."""
+
+    def _directions(self, x: Floats, y: Floats, width: int, height: int) -> Floats:
+        """Unit directions (..., 3) along the axes right, up and forward; NaN where the film shows nothing."""
+        raise NotImplementedError
+
+    def _film(self, across: Floats, above: Floats, ahead: Floats, width: int, height: int) -> tuple[Floats, Floats]:
+        """The film positions of points with these components along the axes; NaN where no ray reaches them."""
+        raise NotImplementedError
+
+    def _rays(self, x: Floats, y: Floats, width: int, height: int) -> tuple[Floats, Floats]:
+        (right, up, forward), local = self.frame(), self._directions(x, y, width, height)
+        across, above, ahead = (local[..., k : k + 1] for k in range(3))
+        directions = unit_rows(across * right + above * up + ahead * forward)
+        return np.broadcast_to(np.asarray(self.eye), directions.shape), directions
+
+    def _film_of(self, points: Floats, width: int, height: int) -> tuple[Floats, Floats]:
+        away = points - np.asarray(self.eye)
+        across, above, ahead = (along(away, axis) for axis in self.frame())
+        return self._film(across, above, ahead, width, height)
