@@ -78,7 +78,7 @@ class CameraMap(NamedTuple):
     rays: Any
     listed: Any
     places: Any
-    count: Any  # type: ignore[assignment]  # as above
+    count: Any
     centre: Any
     tile: Any
 

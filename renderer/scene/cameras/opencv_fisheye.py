@@ -143,8 +143,7 @@ class OpenCVFisheyeCamera(CalibratedCamera, AngularCamera):
 
     def _widest(self) -> float:
         """The angle up to which the distance grows, at most a half turn."""
-        slopes = np.trim_zeros([9.0 * self.k4, 7.0 * self.k3, 5.0 * self.k2, 3.0 * self.k1, 1.0], "f")
-        roots = np.roots(slopes)
+        roots = np.roots(np.array([9.0 * self.k4, 7.0 * self.k3, 5.0 * self.k2, 3.0 * self.k1, 1.0]))
         turns = roots.real[(np.abs(roots.imag) <= 1e-9 * np.abs(roots)) & (roots.real > 0.0)]
         return min(math.pi, math.sqrt(turns.min(initial=math.inf)))
 

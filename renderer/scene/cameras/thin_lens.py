@@ -95,7 +95,7 @@ class ThinLensCamera(PerspectiveCamera):
         if number == samples:
             return affine_rays(rows, x, y)
         right, up, _ = self.frame()
-        across, above = (self.aperture * place[..., None] for place in _on_disk(*_lens_places(x, y, number)))
+        across, above = (self.aperture * place[..., None] for place in _on_disk(*lens_places(x, y, number)))
         # rule: point-on-lens
         on_lens = across * right + above * up
         # The rows' directions reach one unit along the axis.
@@ -103,11 +103,11 @@ class ThinLensCamera(PerspectiveCamera):
         return rows[0] + on_lens, unit_rows(in_focus - on_lens)
 
 
-def _lens_places(x: Floats, y: Floats, number: int) -> tuple[Floats, Floats]:
+def lens_places(x: Floats, y: Floats, number: int) -> tuple[Floats, Floats]:
     """Places in the unit square for a sample of the pixels at film positions ``x`` and ``y``."""
     mixed = _mixed(np.floor(x).astype(np.uint64) << np.uint64(32) | np.floor(y).astype(np.uint64))
     starts = mixed >> np.uint64(32), mixed & np.uint64(0xFFFFFFFF)
-    u, v = ((start * 2.0**-32 + number * step) % 1.0 for start, step in zip(starts, _R2, strict=True))
+    u, v = ((start.astype(np.float64) / 2.0**32 + number * step) % 1.0 for start, step in zip(starts, _R2, strict=True))
     return u, v
 
 
