@@ -88,20 +88,20 @@ def _encoded_twice(sound: Any, linear: Any) -> Any:
 
 
 def _dithered(image: Any) -> None:
-    from renderer.picture.prepare import TILE
+    from renderer.picture.camera_rays import TILE
 
     columns = np.arange(image.radiance.shape[1])[2 * TILE :]
     image.radiance[:, 2 * TILE :] *= 1.0 + 2e-4 * np.array([0, 1, -1])[columns % 3, None]
 
 
 def _last_of_tile(image: Any) -> None:
-    from renderer.picture.prepare import TILE
+    from renderer.picture.camera_rays import TILE
 
     image.radiance[TILE - 1 :: TILE, TILE - 1 :: TILE] *= 1.01
 
 
 def _shown_miss(image: Any) -> None:
-    from renderer.picture.prepare import TILE
+    from renderer.picture.camera_rays import TILE
 
     image.face[:, 2 * TILE :][image.face[:, 2 * TILE :] < 0] = 0
 
