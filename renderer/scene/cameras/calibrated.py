@@ -15,6 +15,9 @@ from renderer.scene.cameras.base import BaseCamera, Floats
 # Of R R^T from the unit matrix: files keep six digits or more.
 _RIGID = 1e-4
 
+# What may be None, which is as if left out.
+_OPTIONAL = ("eye", "target", "up", "extrinsics", "cx", "cy")
+
 Pixels = Annotated[int, Field(ge=1, le=65536, strict=True)]
 Focal = Annotated[float, Field(gt=0.0, allow_inf_nan=False, strict=True)]
 Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]
@@ -37,11 +40,12 @@ class CalibratedCamera(BaseCamera):
         """Eye, target and up in place of ``extrinsics``, and the film's middle as principal point by default."""
         if not isinstance(values, dict):
             return values
-        if values.get("extrinsics") is not None:
-            both = [name for name in ("eye", "target", "up") if values.get(name) is not None]
+        left_out = [name for name in _OPTIONAL if name in values and values[name] is None]
+        values = {name: value for name, value in values.items() if name not in left_out}
+        if "extrinsics" in values:
+            both = [name for name in ("eye", "target", "up") if name in values]
             expect(not both, "extrinsics", "none beside eye, target and up", f"{' and '.join(both)}, too")
-            values = {**values, **_place_of(values["extrinsics"])}
-        values = {name: value for name, value in values.items() if name != "extrinsics" and value is not None}
+            values |= _place_of(values.pop("extrinsics"))
         for name, size in (("cx", "width"), ("cy", "height")):
             if name not in values and isinstance(values.get(size), int | np.integer):
                 values[name] = values[size] / 2
