@@ -145,12 +145,12 @@ CAMERA = {
 PIXELS = Field(NEEDED, same(1, 65536), [0, -1, 65537, 4.0, True, "4"])
 CALIBRATED = {
     **CAMERA, "width": PIXELS, "height": PIXELS,
-    **dict.fromkeys(("fx", "fy"), number(NEEDED, TINY, HUGE, refused=(0.0, -1.0, BEYOND))),
+    **dict.fromkeys(("fx", "fy"), number(NEEDED, 1e-9, 1e9, refused=(0.0, -1.0, 1.1e9, BEYOND))),
     **{
-        name: number(middle, -HUGE, HUGE, refused=(BEYOND,))._replace(refuses=[True, "1", [1.0], math.nan, BEYOND])
+        name: number(middle, -1e9, 1e9, refused=(BEYOND,))._replace(refuses=[True, "1", [1.0], math.nan, BEYOND])
         for name, middle in (("cx", 32.0), ("cy", 24.0))
     },
-    "skew": number(0.0, -HUGE, HUGE, refused=(BEYOND,)),
+    "skew": number(0.0, -1e9, 1e9, refused=(-1.1e9, BEYOND)),
 }  # fmt: skip
 FIELDS: dict[type, dict[str, Field]] = {
     PerspectiveCamera: {
@@ -177,7 +177,7 @@ FIELDS: dict[type, dict[str, Field]] = {
     PinholeCamera: {"type": kind("pinhole"), **CALIBRATED},
     OpenCVFisheyeCamera: {
         "type": kind("opencv_fisheye"), **CALIBRATED,
-        **dict.fromkeys(("k1", "k2", "k3", "k4"), number(0.0, -HUGE, HUGE, refused=(BEYOND,))),
+        **dict.fromkeys(("k1", "k2", "k3", "k4"), number(0.0, -1e9, 1e9, refused=(1.1e9, BEYOND))),
     },
     DirectionalLight: {
         "type": kind("directional"), "direction": triple(NEEDED, (0, 0, 0), (0.0, -0.0, 0.0)),

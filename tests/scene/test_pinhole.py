@@ -99,7 +99,7 @@ def test_square_pixels_about_the_middle_are_a_perspective_camera() -> None:
 
 
 def test_a_picture_has_the_cameras_own_size_unless_another_is_stated() -> None:
-    camera = PinholeCamera(width=32, height=24, fx=40, fy=40, **PLACE)
+    camera = PinholeCamera(width=np.int64(32), height=np.uint8(24), fx=40, fy=np.float32(40), **PLACE)
     ball = SceneObject(mesh=shapes.icosphere(2), material="m")
     scene = Scene(camera=camera, materials={"m": Phong()}, objects=[ball], render={"samples": 4})
     assert render(scene).radiance.shape == (24, 32, 3)
@@ -119,8 +119,8 @@ def test_a_scene_file_places_a_camera_by_its_extrinsics() -> None:
     ("changes", "said"),
     [
         ({"fx": np.nan}, "fx: expected a finite number, got nan"),
-        ({"fx": 0.0}, "fx: expected a number greater than 0, got 0"),
-        ({"fy": -2.0}, "fy: expected a number greater than 0, got -2"),
+        ({"fx": 0.0}, "fx: expected a number greater than or equal to 0.000000001, got 0"),
+        ({"fy": -2.0}, "fy: expected a number greater than or equal to 0.000000001, got -2"),
         ({"cx": np.inf}, "cx: expected a finite number, got inf"),
         ({"skew": "1"}, "skew: expected a number, got '1'"),
         ({"width": 0}, "width: expected a number greater than or equal to 1, got 0"),

@@ -276,13 +276,18 @@ class AffineCamera(BaseCamera):
 class CentralCamera(AffineCamera):
     """An affine camera whose rays all start at its eye."""
 
+    def _intrinsics(self, width: int, height: int) -> tuple[float, float, float, float, float]:
+        """fx, fy, cx, cy and skew in pixels of a film of some size."""
+        raise NotImplementedError
+
     def _film_of(self, points: Floats, width: int, height: int) -> tuple[Floats, Floats]:
-        _, _, _, corner, across, down = self.rows(width, height)
-        # point - eye = s corner + (s x) across + (s y) down, by Cramer's rule.
+        right, up, forward = self.frame()
+        fx, fy, cx, cy, skew = self._intrinsics(width, height)
         away = points - np.asarray(self.eye)
-        s = along(away, np.cross(across, down))
-        s[~(s > 0.0)] = np.nan
-        return along(away, np.cross(down, corner)) / s, along(away, np.cross(corner, across)) / s
+        z = along(away, forward)
+        z[~(z > 0.0)] = np.nan
+        down = -along(away, up) / z
+        return fx * (along(away, right) / z) + skew * down + cx, fy * down + cy
 
 
 class AngularCamera(BaseCamera):

@@ -18,9 +18,12 @@ _RIGID = 1e-4
 # What may be None, which is as if left out.
 _OPTIONAL = ("eye", "target", "up", "extrinsics", "cx", "cy")
 
-Pixels = Annotated[int, Field(ge=1, le=65536, strict=True)]
-Focal = Annotated[float, Field(gt=0.0, allow_inf_nan=False, strict=True)]
-Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+_MOST_PIXELS = 65536
+# So that products of intrinsics and directions are far from the ends of float64.
+_LARGEST = 1e9
+Pixels = Annotated[int, Field(ge=1, le=_MOST_PIXELS, strict=True)]
+Focal = Annotated[float, Field(ge=1.0 / _LARGEST, le=_LARGEST, allow_inf_nan=False, strict=True)]
+Number = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST, allow_inf_nan=False, strict=True)]
 
 
 class CalibratedCamera(BaseCamera):
@@ -30,9 +33,9 @@ class CalibratedCamera(BaseCamera):
     height: Pixels
     fx: Focal
     fy: Focal
-    cx: Finite
-    cy: Finite
-    skew: Finite = 0.0
+    cx: Number
+    cy: Number
+    skew: Number = 0.0
 
     @model_validator(mode="before")
     @classmethod
@@ -47,7 +50,11 @@ class CalibratedCamera(BaseCamera):
             expect(not both, "extrinsics", "none beside eye, target and up", f"{' and '.join(both)}, too")
             values |= _place_of(values.pop("extrinsics"))
         for name, size in (("cx", "width"), ("cy", "height")):
-            if name not in values and isinstance(values.get(size), int | np.integer):
+            if (
+                name not in values
+                and isinstance(values.get(size), int | np.integer)
+                and 0 < values[size] <= _MOST_PIXELS
+            ):
                 values[name] = values[size] / 2
         return values
 
@@ -61,7 +68,6 @@ class CalibratedCamera(BaseCamera):
         same = far <= max(self.width, self.height)
         expected = f"{self.width} x {self.height}, the camera's own, or another size of that shape"
         expect(same, "resolution", expected, f"{width} x {height}")
-        # rule: scaled-intrinsics
         x, y = width / self.width, height / self.height
         return self.fx * x, self.fy * y, self.cx * x, self.cy * y, self.skew * x
 
@@ -72,7 +78,6 @@ def opencv_intrinsics(K: ArrayLike) -> tuple[float, float, float, float, float]:
     shape = matrix.shape == (3, 3) and matrix[1, 0] == 0.0 and matrix[2].tolist() == [0.0, 0.0, 1.0]
     expect(shape, "K", "[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]", repr(matrix.tolist()))
     (fx, skew, cx), (_, fy, cy), _ = matrix.tolist()
-    # rule: opencv-pixel-centre
     return fx, fy, cx + 0.5, cy + 0.5, skew
 
 

@@ -12,7 +12,7 @@ from renderer.arguments.arrays import real_argument
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.scene.cameras.base import AngularCamera, Floats
-from renderer.scene.cameras.calibrated import CalibratedCamera, Finite, opencv_extrinsics, opencv_intrinsics
+from renderer.scene.cameras.calibrated import CalibratedCamera, Number, opencv_extrinsics, opencv_intrinsics
 from renderer.scene.cameras.fisheye import turned_away
 from renderer.scene.fields import stated
 
@@ -55,10 +55,10 @@ class OpenCVFisheyeCamera(CalibratedCamera, AngularCamera):
     """
 
     type: Literal["opencv_fisheye"] = "opencv_fisheye"
-    k1: Finite = 0.0
-    k2: Finite = 0.0
-    k3: Finite = 0.0
-    k4: Finite = 0.0
+    k1: Number = 0.0
+    k2: Number = 0.0
+    k3: Number = 0.0
+    k4: Number = 0.0
 
     @stated
     def __init__(
@@ -143,9 +143,10 @@ class OpenCVFisheyeCamera(CalibratedCamera, AngularCamera):
 
     def _widest(self) -> float:
         """The angle up to which the distance grows, at most a half turn."""
-        roots = np.roots(np.array([9.0 * self.k4, 7.0 * self.k3, 5.0 * self.k2, 3.0 * self.k1, 1.0]))
+        # In s = 1 / angle^2, whose highest power has the coefficient 1.
+        roots = np.roots(np.array([1.0, 3.0 * self.k1, 5.0 * self.k2, 7.0 * self.k3, 9.0 * self.k4]))
         turns = roots.real[(np.abs(roots.imag) <= 1e-9 * np.abs(roots)) & (roots.real > 0.0)]
-        return min(math.pi, math.sqrt(turns.min(initial=math.inf)))
+        return 1.0 / math.sqrt(turns.max(initial=math.pi**-2.0))
 
     def _angle(self, distance: Floats) -> Floats:
         """The inverse of ``_distance``, by Newton's method within bounds; NaN where there is none."""

@@ -61,6 +61,10 @@ class PerspectiveCamera(CentralCamera):
             degrees = math.degrees(self.fov)
             yield f"fov: expected degrees, got {self.fov:.6g}. If these are radians, write fov={degrees:.6g}."
 
+    def _intrinsics(self, width: int, height: int) -> tuple[float, float, float, float, float]:
+        focal = height / (2.0 * math.tan(math.radians(self.fov) / 2.0))
+        return focal, focal, width / 2.0, height / 2.0, 0.0
+
     def rows(self, width: int, height: int) -> Floats:
         right, up, forward = self.frame()
         pixel = 2.0 * math.tan(math.radians(self.fov) / 2.0) / height

@@ -21,7 +21,7 @@ class PinholeCamera(CalibratedCamera, CentralCamera):
         The film in pixels. Pictures have this resolution by default. At another one of the same shape, up to a pixel,
         the intrinsics are scaled.
     fx, fy : float
-        Focal lengths in pixels, above 0.
+        Focal lengths in pixels, from 1e-9 to 1e9.
     cx, cy : float, optional
         The principal point in pixels from the film's top left corner, by default the middle. The centre of the first
         pixel is at (0.5, 0.5), as for COLMAP and nerfstudio. `from_opencv` takes OpenCV's, which are half a pixel less.
@@ -36,7 +36,7 @@ class PinholeCamera(CalibratedCamera, CentralCamera):
     Raises
     ------
     SceneError
-        For values that are not finite, a focal length that is not above 0, or an R that is not a rotation within 1e-4.
+        For values that are not finite or out of range, or an R that is not a rotation within 1e-4.
 
     Examples
     --------
