@@ -1,8 +1,11 @@
 """What the page shows of cameras that it does not have."""
 
+import math
+from pathlib import Path
 from typing import Any
 
 import pytest
+import tomlkit
 
 from renderer import (
     EquirectangularCamera,
@@ -16,8 +19,11 @@ from renderer import (
     ThinLensCamera,
     shapes,
 )
+from renderer.mesh.load import save_ply
+from renderer.viewer.commands import scene_text
 from renderer.viewer.payload import description
-from renderer.viewer.shown import prepare_shown
+from renderer.viewer.protocol import SaveScene
+from renderer.viewer.shown import open_file, prepare_shown
 from renderer.viewer.viewpoint import page_camera
 
 PLACE: dict[str, Any] = {"eye": (1.0, 2.0, 5.0), "target": (0.0, 0.5, 0.0), "up": (0.1, 1.0, 0.0)}
@@ -46,3 +52,19 @@ def test_a_scene_with_a_calibrated_camera_opens() -> None:
     ball = SceneObject(mesh=shapes.icosphere(1), material="m")
     shown = prepare_shown(Scene(camera=PINHOLE, materials={"m": Phong()}, objects=[ball]))
     assert description(shown)["camera"]["type"] == "perspective"
+
+
+def test_another_view_does_not_replace_a_camera_that_the_page_lacks(tmp_path: Path) -> None:
+    save_ply(shapes.icosphere(1), tmp_path / "ball.ply")
+    table = {"camera": PINHOLE.model_dump(), "materials": {"m": {}}, "objects": [{"mesh": "ball.ply", "material": "m"}]}
+    (tmp_path / "a.toml").write_text(tomlkit.dumps(table))
+    shown, seen = open_file(tmp_path / "a.toml"), page_camera(PINHOLE)
+    right, up, forward = (axis.tolist() for axis in seen.frame())
+    for eye, told in ((seen.eye, None), ((3.0, 2.0, 5.0), "the view of the file's pinhole camera")):
+        m = [*right, 0.0, *up, 0.0, *(-x for x in forward), 0.0, *eye, 1.0]
+        asked = SaveScene.model_validate({"type": "save", "m": m, "fovy": math.pi / 2, "settings": {"max_depth": 3}})
+        if told is None:
+            assert 'type = "pinhole"' in scene_text(shown, asked).text
+        else:
+            with pytest.raises(ValueError, match=told):
+                scene_text(shown, asked)

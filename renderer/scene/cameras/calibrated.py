@@ -50,12 +50,9 @@ class CalibratedCamera(BaseCamera):
             expect(not both, "extrinsics", "none beside eye, target and up", f"{' and '.join(both)}, too")
             values |= _place_of(values.pop("extrinsics"))
         for name, size in (("cx", "width"), ("cy", "height")):
-            if (
-                name not in values
-                and isinstance(values.get(size), int | np.integer)
-                and 0 < values[size] <= _MOST_PIXELS
-            ):
-                values[name] = values[size] / 2
+            pixels = values.get(size)
+            if name not in values and isinstance(pixels, int | np.integer):
+                values[name] = min(max(pixels, 0), _MOST_PIXELS) / 2  # others are refused with their field
         return values
 
     @property
@@ -108,7 +105,8 @@ def _place_of(extrinsics: ArrayLike) -> dict[str, tuple[float, ...]]:
     last = matrix[3:].tolist()
     expect(last in ([], [[0.0, 0.0, 0.0, 1.0]]), "extrinsics", "a last row of 0, 0, 0, 1", last)
     turn, move = matrix[:3, :3], matrix[:3, 3]
-    rigid = np.abs(turn @ turn.T - np.eye(3)).max() <= _RIGID and np.linalg.det(turn) > 0.0
+    with np.errstate(all="ignore"):
+        rigid = np.abs(turn @ turn.T - np.eye(3)).max() <= _RIGID and np.linalg.det(turn) > 0.0
     expect(bool(rigid), "extrinsics", "a rotation R, without a scale or a mirror, in [R|t]", repr(turn.tolist()))
     eye = 0.0 - np.linalg.solve(turn, move)
     # As far away as the eye is from the origin, or their difference would lose digits.
