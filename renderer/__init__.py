@@ -21,7 +21,9 @@ The public names::
     Scenes and pictures
         load_scene           a scene from a .toml file, or around a mesh file
         Scene                camera, materials, lights, objects; faults raise SceneError, slips warn with SceneWarning
-        PerspectiveCamera, OrthographicCamera
+        PerspectiveCamera, OrthographicCamera, ThinLensCamera
+        PinholeCamera, OpenCVFisheyeCamera   calibrated cameras, as of OpenCV, COLMAP and nerfstudio
+        FisheyeCamera, EquirectangularCamera
         Phong, Mirror, Dielectric
         DirectionalLight, PointLight
         Sky                  a gradient around the scene, which shines

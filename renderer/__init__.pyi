@@ -24,8 +24,13 @@ from .results.closest_points import ClosestPoints as ClosestPoints
 from .results.hits import AllHits as AllHits
 from .results.hits import Hits as Hits
 from .results.steps import Steps as Steps
-from .scene.camera import OrthographicCamera as OrthographicCamera
-from .scene.camera import PerspectiveCamera as PerspectiveCamera
+from .scene.cameras.equirectangular import EquirectangularCamera as EquirectangularCamera
+from .scene.cameras.fisheye import FisheyeCamera as FisheyeCamera
+from .scene.cameras.opencv_fisheye import OpenCVFisheyeCamera as OpenCVFisheyeCamera
+from .scene.cameras.orthographic import OrthographicCamera as OrthographicCamera
+from .scene.cameras.perspective import PerspectiveCamera as PerspectiveCamera
+from .scene.cameras.pinhole import PinholeCamera as PinholeCamera
+from .scene.cameras.thin_lens import ThinLensCamera as ThinLensCamera
 from .scene.fields import SceneWarning as SceneWarning
 from .scene.light import DirectionalLight as DirectionalLight
 from .scene.light import PointLight as PointLight

@@ -14,11 +14,16 @@ import tomlkit
 
 from renderer import (
     DirectionalLight,
+    EquirectangularCamera,
+    FisheyeCamera,
     Image,
+    OpenCVFisheyeCamera,
     OrthographicCamera,
     PerspectiveCamera,
+    PinholeCamera,
     PointLight,
     Scene,
+    ThinLensCamera,
     load_scene,
     render,
 )
@@ -37,6 +42,12 @@ Keys = tuple[str | int, ...]
 _CAMERA: Table = {"eye": [2.5, 2.0, 4.0], "target": [0.0, 0.4, 0.0], "up": [0.1, 1.0, 0.0]}
 PERSPECTIVE = {"type": "perspective", **_CAMERA, "fov": 40.0}
 ORTHOGRAPHIC = {"type": "orthographic", **_CAMERA, "height": 3.5}
+_FILM: Table = {"width": 20, "height": 16, "fx": 22.0, "fy": 20.0, "cx": 9.0, "cy": 8.5, "skew": 1.0}
+PINHOLE = {"type": "pinhole", **_CAMERA, **_FILM}
+FISHEYE = {"type": "fisheye", **_CAMERA, "fov": 70.0}
+OPENCV_FISHEYE = {"type": "opencv_fisheye", **_CAMERA, **_FILM, "k1": 0.1, "k2": 0.02, "k3": 0.03, "k4": 0.01}
+EQUIRECTANGULAR = {"type": "equirectangular", **_CAMERA}
+THIN_LENS = {"type": "thin_lens", **_CAMERA, "fov": 40.0, "aperture": 0.3, "focus": 4.0}
 _SUN = {"type": "directional", "direction": [-0.6, -1.0, -0.5], "irradiance": [0.6, 0.7, 0.5]}
 _LAMP = {"type": "point", "position": [0.5, 3.0, 1.5], "intensity": [3.0, 2.0, 4.0]}
 _WAX = {
@@ -67,6 +78,9 @@ BASE: Table = {
                "shadows": True},
 }  # fmt: skip
 
+_PLACE: Table = {"eye": [1.5, 2.5, 3.5], "target": [0.2, 0.6, 0.1], "up": [-0.2, 1.0, 0.1]}
+# A larger film of the same shape, up to a pixel, as the pictures are of the least one.
+_OTHER_FILM: Table = {"width": 21, "height": 17, "fx": 30.0, "fy": 30.0, "cx": 12.0, "cy": 11.0, "skew": 4.0}
 # By class and field. That of ``type`` stands for its whole table, as another type has other fields; the eye's is within
 # two bodies, from where rays begin otherwise.
 OTHERS: dict[type[Fields], Table] = {
@@ -74,6 +88,11 @@ OTHERS: dict[type[Fields], Table] = {
                         "up": [-0.2, 1.0, 0.1], "fov": 50.0},
     OrthographicCamera: {"type": PERSPECTIVE, "eye": [-2.5, 2.5, 3.5], "target": [0.2, 0.6, 0.1],
                          "up": [-0.2, 1.0, 0.1], "height": 2.5},
+    PinholeCamera: {"type": PERSPECTIVE, **_PLACE, **_OTHER_FILM},
+    FisheyeCamera: {"type": PERSPECTIVE, **_PLACE, "fov": 90.0},
+    OpenCVFisheyeCamera: {"type": PERSPECTIVE, **_PLACE, **_OTHER_FILM, "k1": -0.3, "k2": 0.3, "k3": -0.3, "k4": 0.3},
+    EquirectangularCamera: {"type": PERSPECTIVE, **_PLACE},
+    ThinLensCamera: {"type": PERSPECTIVE, **_PLACE, "fov": 50.0, "aperture": 0.8, "focus": 1.5},
     Phong: {"type": _GLASS, "diffuse": [0.9, 0.1, 0.4], "ambient": [0.9, 0.7, 0.2], "specular": [0.9, 0.1, 0.7],
             "shininess": 40.0, "reflectance": [0.6, 0.5, 0.1], "transmittance": [0.8, 0.1, 0.2], "ior": 1.7},
     Mirror: {"type": _CHALK, "reflectance": [0.3, 0.9, 0.4]},
@@ -171,10 +190,11 @@ _SKY = {"zenith": [0.1, 0.2, 0.5], "horizon": [0.5, 0.4, 0.3], "ground": [0.2, 0
         "sun": [-0.5, -1.0, -0.3], "sun_irradiance": [0.4, 0.5, 0.3], "sun_angle": 10.0, "sun_lights": 3}  # fmt: skip
 _UNDER_SKY = {name: value for name, value in BASE.items() if name != "background"} | {"sky": _SKY}
 
-# All of a scene, those of its camera where that is of the other type, and those of a sky.
+# All of a scene, those of its camera where that is of another type, and those of a sky.
 VARIATIONS = list(_variations(BASE))
 VARIATIONS += [other for other in _variations(_UNDER_SKY) if other.keys[0] == "sky"]
-VARIATIONS += [other for other in _variations(BASE | {"camera": ORTHOGRAPHIC}) if other.keys[0] == "camera"]
+for _kind in (ORTHOGRAPHIC, PINHOLE, FISHEYE, OPENCV_FISHEYE, EQUIRECTANGULAR, THIN_LENS):
+    VARIATIONS += [other for other in _variations(BASE | {"camera": _kind}) if other.keys[0] == "camera"]
 
 
 def picture(scene: Scene, **options: Any) -> Image:

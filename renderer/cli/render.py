@@ -142,7 +142,8 @@ def _matte(ready: Any, options: argparse.Namespace) -> Any:
     from renderer.system.threads import checked_threads
 
     scene = ready.scene
-    chosen = checked_settings(scene.render, {name: getattr(options, name) for name in ("resolution", "samples")})
+    given = {name: getattr(options, name) for name in ("resolution", "samples")}
+    chosen = checked_settings(scene.render, given, scene.camera)
     return matte_of(ready, scene.camera, chosen, checked_threads(options.threads))
 
 

@@ -192,7 +192,12 @@ def _options_of(options: argparse.Namespace, up: str) -> dict[str, Any]:
 def _camera(options: argparse.Namespace) -> Any:
     from renderer.scene.scene import load_scene
 
-    return None if options.camera is None else load_scene(options.camera).camera
+    if options.camera is None:
+        return None
+    camera = load_scene(options.camera).camera
+    # The legend takes some rows of the picture.
+    expect(camera.film_size is None, "--camera", "a camera whose film may have any shape", f"one of type {camera.type}")
+    return camera
 
 
 def _chosen(octree: Any, options: argparse.Namespace, up: Any) -> Any:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from renderer.arguments.types import ArrayLike
 from renderer.picture.image import srgb, srgb_steps
-from renderer.scene.camera import checked_vector
+from renderer.scene.vectors import checked_vector
 from renderer.shade.face_colors import PLACES, shade_faces
 from renderer.shade.records import AMBIENT, DIFFUSE, KIND, LAMBERT, REFLECTANCE, TRANSMITTANCE
 from renderer.shade.surface import SceneArrays

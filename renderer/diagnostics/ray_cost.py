@@ -26,13 +26,13 @@ def camera_steps(
     the counting.
     """
     width, height = size
-    rows, steps = camera.rows(width, height), []
+    steps = []
     at_a_time, (begin, end) = max(1, _RAYS // width), band or (0, height)
-    x = (np.arange(width) + 0.5)[None, :, None]
+    x = np.arange(width) + 0.5
     for first in range(begin, end, at_a_time):
-        y = (np.arange(first, min(first + at_a_time, end)) + 0.5)[:, None, None]
-        origins, directions = (row + x * in_x + y * in_y for row, in_x, in_y in (rows[:3], rows[3:]))
-        steps.append(prepared.octree.count_steps(origins, directions))
+        y = np.arange(first, min(first + at_a_time, end)) + 0.5
+        pixels = np.stack(np.meshgrid(x, y), axis=-1)
+        steps.append(prepared.octree.count_steps(*camera.rays(pixels, size)))
         if finished is not None:
             finished(len(y) / (end - begin))
     return Steps(*(np.concatenate([getattr(some, name) for some in steps]) for name in ("nodes", "triangles")))

@@ -14,7 +14,7 @@ from renderer.diagnostics.ray_step import Aim, Ray, Steps, SurfaceHit, Vector, c
 from renderer.errors import expect
 from renderer.numerics.vec3 import add
 from renderer.picture.prepare import PreparedScene
-from renderer.scene.camera import checked_vector
+from renderer.scene.vectors import checked_vector
 from renderer.shade.direct import MOST_PANES
 
 # In glass there are up to 2^d rays of depth d: too many to look at, and to wait for after a click. This many are all of

@@ -12,12 +12,13 @@ from renderer.jit.notice import Stopwatch
 from renderer.lazy import lazy
 from renderer.mesh.mesh import Mesh
 from renderer.octree import BruteForce, Octree
+from renderer.picture.camera_rays import TILE, rays_of_tiles, tile_side
 from renderer.picture.image import PLANES, Image
 from renderer.picture.pack import media_around, pack
 from renderer.picture.placed import placed, placed_arrays
 from renderer.picture.touching import find_touching, touching_faces
 from renderer.rayscene.built import BuiltScene, SceneTree
-from renderer.scene.camera import Camera, sample_offsets
+from renderer.scene.camera import Camera
 from renderer.scene.needs import Features
 from renderer.scene.scene import RenderSettings, Scene
 from renderer.shade.bundle import SIZE
@@ -32,10 +33,6 @@ from renderer.trace.spawn import OffsetRule
 # The rule by which a ray knows the media on both sides of a surface: from the stack of those that it is in, or from the
 # side of the normal alone.
 MediaRule = Literal["stack", "normal"]
-
-# The side of a tile in pixels: 256 tiles share a 512 x 512 picture, and neighbouring rays find their nodes in the
-# cache.
-TILE = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,10 +122,11 @@ class PreparedScene:
         planes: Collection[str] = PLANES,
         band: tuple[int, int] | None = None,
         media: MediaRule = "stack",
+        columns: tuple[int, int] | None = None,
     ) -> Image:
         """The picture that ``camera`` takes, by checked settings; see ``render``. Of a ``band`` of rows, first and
         end, only these: with the bits that they have in the whole picture, and in little more memory than their own
-        pixels take.
+        pixels take. Of ``columns`` likewise, with the memory of those to their left.
 
         ``finished(tiles)`` is called after each tile, and with 0 at least every 16,384 rays of a long one, shadow rays
         not counted, by one thread at a time. What it raises stops the others and is raised here.
@@ -136,27 +134,30 @@ class PreparedScene:
         clock = Stopwatch()
         width, height = chosen.resolution
         first_row, end_row = (0, height) if band is None else band
-        rows, samples = camera.rows(width, height), sample_offsets(chosen.samples)
+        first_column, end_column = (0, width) if columns is None else columns
+        view = camera, (width, height), chosen.samples
+        rays_of, side = rays_of_tiles(*view), tile_side(*view)
         settings = kernel_settings_of(self.needs, chosen, offset, media)
         arrays = arrays_for(self, camera, offset, media)
         arrays = arrays._replace(soft=chosen.terminator == "soft", clear=chosen.glass_shadows == "clear")
-        across, cut = -(-width // TILE), np.zeros(tiles(width, end_row - first_row), np.int64)
+        wide, tall = end_column - first_column, end_row - first_row
+        across, cut = -(-wide // side), np.zeros(tiles(wide, tall, side), np.int64)
 
         def render_in(film: Film, first: int) -> Iterator[None]:
-            x, y = first % across * TILE, first_row + first // across * TILE
-            tall, wide = film.radiance.shape[:2]
-            tile = Rectangle(x, y, min(x + TILE, wide), min(y + TILE, tall))
-            scratch = tile_scratch(self.tree.depth, settings, _bundles_in_a_row(self.tree))
-            while not render_tile(self.tree.descriptor, arrays, settings, rows, samples, film, tile, scratch):
+            x, y = first_column + first % across * side, first_row + first // across * side
+            bottom, right = film.radiance.shape[:2]
+            tile = Rectangle(x, y, min(x + side, right), min(y + side, bottom))
+            scratch, rays = tile_scratch(self.tree.depth, settings, _bundles_in_a_row(self.tree)), rays_of(tile)
+            while not render_tile(self.tree.descriptor, arrays, settings, rays, film, tile, scratch):
                 yield
             cut[first] = scratch.state[CUT]
 
         # The kernel is loaded before the picture takes its memory: without any left, LLVM ends the process.
         for _ in render_in(_film(1, 0, planes), 0):
             pass
-        film = _film(width, end_row, planes, first_row)
+        film = _film(end_column, end_row, planes, first_row)
         for_chunks(lambda first, _end: render_in(film, first), len(cut), 1, threads, finished)
-        film = _film_from(first_row, film)
+        film = _film_from(first_row, first_column, film)
         return Image(*film, build_seconds=self.build_seconds, render_seconds=clock.seconds(), cut=int(cut.sum()))
 
 
@@ -203,9 +204,9 @@ def _restored(
     return replace(restored, build_seconds=build_seconds)
 
 
-def tiles(width: int, height: int) -> int:
+def tiles(width: int, height: int, side: int = TILE) -> int:
     """The number of tiles of a picture."""
-    return -(-width // TILE) * -(-height // TILE)
+    return -(-width // side) * -(-height // side)
 
 
 def build_octree(
@@ -261,9 +262,9 @@ def media_limit(needs: Features, media: MediaRule) -> int:
     return MAX_MEDIA if needs.refraction and media == "stack" else 0
 
 
-def _film_from(row: int, film: Film) -> Film:
-    """The film without the rows before one."""
-    planes: tuple[Any, ...] = tuple(plane[row:] for plane in film)
+def _film_from(row: int, column: int, film: Film) -> Film:
+    """The film without the rows and columns before some."""
+    planes: tuple[Any, ...] = tuple(np.ascontiguousarray(plane[row:, column:]) for plane in film)
     return Film(*planes)
 
 

@@ -1,14 +1,17 @@
 """``render`` and ``prepare``: a scene and settings in, checked, and a picture out."""
 
 import warnings
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from numbers import Real
 from typing import Any, Literal, NamedTuple, Unpack
 
+from renderer.arguments.arrays import real_argument
 from renderer.errors import expect
+from renderer.picture.camera_rays import tile_side
 from renderer.picture.image import PLANES, CutWarning, Image
 from renderer.picture.prepare import MediaRule, PreparedScene, prepare_scene, tiles
-from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
+from renderer.scene.camera import Camera
+from renderer.scene.cameras.base import BaseCamera
 from renderer.scene.needs import Features, checked_needs
 from renderer.scene.scene import GivenSettings, RenderSettings, Scene, checked_settings
 from renderer.system.terminal import progress_bar
@@ -27,6 +30,7 @@ def render(
     offset: Literal["bounded", "mitsuba"] | float = "bounded",
     media: MediaRule = "stack",
     planes: Collection[str] = PLANES,
+    window: Sequence[int] | None = None,
     threads: int | None = None,
     progress: bool = False,
     **settings: Unpack[GivenSettings],
@@ -38,7 +42,7 @@ def render(
     scene : Scene or PreparedScene
         The scene. What ``prepare`` returns for one saves its preparation: the tree, and all else that does not depend
         on the camera or the settings.
-    camera : PerspectiveCamera or OrthographicCamera, optional
+    camera : PerspectiveCamera, OrthographicCamera or another of the cameras, optional
         Another camera than the scene's.
     accelerator : {"auto", "octree", "brute"}, default "auto"
         The octree, or a test of every ray against every face. "auto" takes the octree unless there are very few faces.
@@ -58,6 +62,9 @@ def render(
     planes : collection of str, default all
         The arrays of the ``Image`` to keep beside ``radiance``, of "depth", "normal", "face" and "rays". They take 28
         of 40 bytes a pixel.
+    window : (int, int, int, int), optional
+        Left, top, right and bottom of the part of the picture to render, in pixels; right and bottom are the first
+        column and row that are left out. Its pixels have the bits that they have in the whole picture.
     threads : int, optional
         The number of threads, by default that of the processors.
     progress : bool, default False
@@ -93,6 +100,8 @@ def render(
     >>> scene = Scene(camera=camera, materials={"grey": Phong()}, objects=[triangle], ambient=1)
     >>> render(scene, resolution=3).face[1].tolist()
     [-1, 0, -1]
+    >>> render(scene, resolution=3, window=(1, 1, 3, 2)).face.tolist()
+    [[0, -1]]
     """
     threads = checked_threads(threads)
     expect(isinstance(scene, Scene | PreparedScene), "scene", "a Scene or a PreparedScene", type(scene).__name__)
@@ -103,8 +112,12 @@ def render(
         prepared = scene
     else:
         prepared = _prepared(scene, view.chosen.max_depth, accelerator, split, needs, threads)
-    with progress_bar(tiles(*view.chosen.resolution), "tile", progress) as update:
-        image = prepared.picture(view.camera, view.chosen, view.offset, threads, update, view.planes, media=view.media)
+    columns, rows = _window(window, *view.chosen.resolution)
+    side = tile_side(view.camera, view.chosen.resolution, view.chosen.samples)
+    with progress_bar(tiles(columns[1] - columns[0], rows[1] - rows[0], side), "tile", progress) as update:
+        image = prepared.picture(
+            view.camera, view.chosen, view.offset, threads, update, view.planes, rows, view.media, columns
+        )
     if image.cut:
         warnings.warn(image.cut_message(view.chosen.max_rays), CutWarning, stacklevel=2)
     return image
@@ -173,8 +186,8 @@ def checked_view(
 ) -> View:
     """The checked view of the arguments of ``render``. Raises ``ValueError`` naming the argument."""
     eye = source.camera if camera is None else camera
-    expect(isinstance(eye, PerspectiveCamera | OrthographicCamera), "camera", "a camera", type(camera).__name__)
-    chosen = checked_settings(source.render, settings)
+    expect(isinstance(eye, BaseCamera), "camera", "a camera", type(camera).__name__)
+    chosen = checked_settings(source.render, settings, eye)
     try:
         kept: tuple[Any, ...] = (planes,) if isinstance(planes, str) else tuple(planes)
     except TypeError:  # also of what claims to be iterable and is not
@@ -210,6 +223,18 @@ def _expect_usual(accelerator: object, split: object, needs: object) -> None:
     for name, value, usual in (("accelerator", accelerator, "auto"), ("split", split, "midpoint")):
         expect(isinstance(value, str) and value == usual, name, f"{usual!r}, as the scene is prepared", repr(value))
     expect(needs is None, "needs", "None, as the scene is prepared", repr(needs))
+
+
+def _window(window: Sequence[int] | None, width: int, height: int) -> tuple[tuple[int, int], tuple[int, int]]:
+    """The columns and rows of a window, first and end each; by default all."""
+    if window is None:
+        return (0, width), (0, height)
+    given = real_argument("window", window)
+    shaped = given.shape == (4,) and given.dtype.kind in "iu"
+    left, top, right, bottom = given.tolist() if shaped else (0, 0, 0, 0)
+    expected = f"left < right, top < bottom, four integers within {width} x {height} pixels"
+    expect(0 <= left < right <= width and 0 <= top < bottom <= height, "window", expected, repr(window))
+    return (left, right), (top, bottom)
 
 
 def _offset(offset: str | float) -> OffsetRule:

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from pydantic import field_validator
 
 from renderer.arguments.types import ArrayLike
-from renderer.scene.camera import unit
 from renderer.scene.fields import Color, Fields, FiniteVector, stated
+from renderer.scene.vectors import unit
 from renderer.shade.records import DIRECTIONAL, POINT
 
 

@@ -23,7 +23,8 @@ from renderer.errors import MeshError, NoSuchSceneError, SceneError, expect, exp
 from renderer.lazy import lazy
 from renderer.mesh.load import MESH_SUFFIXES, FilePaths, load_mesh, mesh_paths, mesh_suffix
 from renderer.mesh.mesh import Mesh
-from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera, sample_offsets
+from renderer.scene.camera import Camera, sample_offsets
+from renderer.scene.cameras.base import BaseCamera
 from renderer.scene.fields import Color, Fields, FiniteVector, Keys, SceneWarning, first_fault, shown, stated, thrice
 from renderer.scene.instance import Instance
 from renderer.scene.light import DirectionalLight, Light, PointLight
@@ -42,9 +43,7 @@ def _typed(default: str) -> BeforeValidator:
     return BeforeValidator(fill)
 
 
-AnyCamera = Annotated[
-    Annotated[PerspectiveCamera | OrthographicCamera, Field(discriminator="type")], _typed("perspective")
-]
+AnyCamera = Annotated[Annotated[Camera, Field(discriminator="type")], _typed("perspective")]
 AnyMaterial = Annotated[Annotated[Material, Field(discriminator="type")], _typed("phong")]
 AnyLight = Annotated[DirectionalLight | PointLight, Field(discriminator="type")]
 # A side of the largest picture.
@@ -158,16 +157,21 @@ class GivenSettings(TypedDict, total=False):
     terminator: Literal["hard", "soft"] | None
 
 
-def checked_settings(defaults: RenderSettings, given: Mapping[str, Any]) -> RenderSettings:
+def checked_settings(
+    defaults: RenderSettings, given: Mapping[str, Any], camera: BaseCamera | None = None
+) -> RenderSettings:
     """``defaults`` with the settings that are given, and not None, in their place, checked as a file's would be.
 
-    Raises ``ValueError`` with one line that names the setting.
+    Where neither says a resolution it is that of ``camera``, if it has one. Raises ``ValueError`` with one line that
+    names the setting.
     """
     for name in given:
         expect_known("render", name, sorted(RenderSettings.model_fields))
     values = {k: v for k, v in given.items() if v is not None}
+    if camera is not None and camera.film_size is not None and "resolution" not in defaults.model_fields_set:
+        values = {"resolution": camera.film_size, **values}
     try:
-        return RenderSettings.model_validate({**defaults.model_dump(), **values})
+        return RenderSettings.model_validate({**defaults.model_dump(exclude_unset=True), **values})
     except ValidationError as error:
         raise ValueError(first_fault(error)) from None
 
@@ -321,7 +325,7 @@ class Scene(Fields):
 
     Parameters
     ----------
-    camera : PerspectiveCamera or OrthographicCamera
+    camera : PerspectiveCamera, OrthographicCamera or another of the cameras
         The camera.
     materials : dict of str to Phong, Mirror or Dielectric
         Materials by the names that objects have for them.
@@ -403,9 +407,11 @@ class Scene(Fields):
         if not isinstance(values, dict) or values.get("up") not in ("x", "z"):
             return values
         camera, up = values.get("camera"), tuple(np.eye(3)[UP_AXES[values["up"]]].tolist())
-        if isinstance(camera, PerspectiveCamera | OrthographicCamera) and "up" not in camera.model_fields_set:
+        if isinstance(camera, BaseCamera) and "up" not in camera.model_fields_set:
             camera = type(camera).model_validate({**camera.model_dump(), "up": up})
-        return {**values, "camera": {"up": up, **camera} if isinstance(camera, dict) else camera}
+        if isinstance(camera, dict) and "extrinsics" not in camera:
+            camera = {"up": up, **camera}
+        return {**values, "camera": camera}
 
     @model_validator(mode="after")
     def _one_background(self) -> Scene:

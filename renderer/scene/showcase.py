@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from renderer.arguments.up import UP_AXES, turn_to
 from renderer.mesh.mesh import Mesh
-from renderer.scene.camera import unit
 from renderer.scene.sky import Sky
+from renderer.scene.vectors import unit
 
 # The ball around the mesh, seen from a little above and to the right, fills the picture's height less a tenth.
 _TOWARDS_EYE, _FOV, _MARGIN = (0.5, 0.4, 1.0), 40.0, 1.1

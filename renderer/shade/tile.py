@@ -1,7 +1,7 @@
 """A tile of the picture: camera rays in blocks of 8 x 8 pixels, one bundle per sample, and the sums of their light.
 
-Depth, normal and face are those of rays through the pixels' centres. If one of them is kept and no sample is at the
-centre, an extra bundle is traced for them, neither lit nor counted.
+Depth, normal and face are those of rays through the pixels' centres. If one of them is kept and no sample is such a
+ray, an extra bundle is traced for them, neither lit nor counted.
 """
 
 from typing import Any, NamedTuple
@@ -56,12 +56,31 @@ class Rectangle(NamedTuple):
     y1: int
 
 
-class CameraMap(NamedTuple):
-    """Pointers to the rows of the camera's affine map and to the samples' places in a pixel, and their number."""
+class CameraRays(NamedTuple):
+    """The camera rays of a tile.
 
-    rows: Any
-    samples: Any
+    rays    the rows (6, 3) of the camera's affine map; or a row (n, 6) for each ray, its origin and unit direction:
+            pixel by pixel of the tile for one place after the other; NaN where there is no ray
+    places  positions in the pixel (p, 2): those of the samples, and then the centre if none of them is there
+    count   the number of samples
+    centre  the number of the place whose first hits are kept: one at the pixel's centre
+    """
+
+    rays: NDArray[np.float64]
+    places: NDArray[np.float64]
     count: int  # type: ignore[assignment]  # tuples have a method of that name
+    centre: int
+
+
+class CameraMap(NamedTuple):
+    """``CameraRays`` as kernels read them: pointers, and whether ``rays`` has a row for each ray of ``tile``."""
+
+    rays: Any
+    listed: Any
+    places: Any
+    count: Any
+    centre: Any
+    tile: Any
 
 
 @inlined
@@ -73,24 +92,39 @@ def _place(k):
 
 
 @inlined
-def _shoot(camera, scene, bundle, across, down, block):
-    """Fill a bundle with the camera rays of a block, all through one place in their pixels: ``across`` and ``down``
-    from the corner.
+def _listed_ray(camera, place, x, y):
+    """Origin and direction of the ray through a pixel's place, where ``camera`` lists its rays."""
+    tile = camera.tile
+    row = (place * (tile.y1 - tile.y0) + y - tile.y0) * (tile.x1 - tile.x0) + x - tile.x0
+    return row3(camera.rays, 2 * row), row3(camera.rays, 2 * row + 1)
+
+
+@inlined
+def _affine_ray(rows, x, y):
+    """Origin and direction of the ray through a place on the film, by the rows of an affine map."""
+    o = add(row3(rows, 0), add(scale(row3(rows, 1), x), scale(row3(rows, 2), y)))
+    d = add(row3(rows, 3), add(scale(row3(rows, 4), x), scale(row3(rows, 5), y)))
+    return o, normalized(d)
+
+
+@inlined
+def _shoot(camera, scene, bundle, place, block):
+    """Fill a bundle with the camera rays of a block, all through one of the places in their pixels.
 
     Pixels count row by row, SIDE per row.
     """
     clear(bundle, 0)
     put_no_start(bundle.starts)
+    across, down = load(camera.places, 2 * place), load(camera.places, 2 * place + 1)
     for k in range(SIZE):
         i, j = _place(k)
         x, y = block.x0 + i, block.y0 + j
         if x < block.x1 and y < block.y1:
             # rule: place-in-pixel
             px, py = x + across, y + down
-            rows = camera.rows
-            o = add(row3(rows, 0), add(scale(row3(rows, 1), px), scale(row3(rows, 2), py)))
-            d = add(row3(rows, 3), add(scale(row3(rows, 4), px), scale(row3(rows, 5), py)))
-            append(bundle, o, normalized(d), (1.0, 1.0, 1.0), j * SIDE + i, scene.media, scene.media_count)
+            o, d = _listed_ray(camera, place, x, y) if camera.listed else _affine_ray(camera.rays, px, py)
+            if d[0] == d[0]:
+                append(bundle, o, d, (1.0, 1.0, 1.0), j * SIDE + i, scene.media, scene.media_count)
 
 
 @inlined
@@ -110,19 +144,13 @@ def _write_first_hits(film, bundle, scratch, block):
                 film.normal[y, x, k] = n[k]
 
 
-@inlined
-def _has_centre(count):
-    """Whether one of so many samples, the middle one, is at the pixel's centre: true for grids with odd sides."""
-    return count % 2 == 1
-
-
 @kernel
 def _look(tree, scene, settings, camera, film, scratch, block):
     """Write the first hits of extra rays through the pixels' centres. Colours, ray counts and surfaces in ``scratch``
     are overwritten.
     """
     bundle = slot(scratch, settings, 0)
-    _shoot(camera, scene, bundle, 0.5, 0.5, block)
+    _shoot(camera, scene, bundle, camera.centre, block)
     meet(tree, scene, bundle, scratch)
     _write_first_hits(film, bundle, scratch, block)
 
@@ -193,13 +221,12 @@ def _next_sample(tree, scene, settings, camera, film, tile, scratch, total, stat
         return False
     if begun == 0:
         _clear_block(scratch, total)
-        if _shows_first_hits(film) and not _has_centre(camera.count):
+        if _shows_first_hits(film) and camera.centre == camera.count:
             _look(tree, scene, settings, camera, film, scratch, block)
     for k in range(SIZE):
         store(scratch.traced, k, 0)
         put3(scratch.color, 3 * k, (0.0, 0.0, 0.0))
-    across, down = load(camera.samples, 2 * begun), load(camera.samples, 2 * begun + 1)
-    _shoot(camera, scene, slot(scratch, settings, 0), across, down, block)
+    _shoot(camera, scene, slot(scratch, settings, 0), begun, block)
     store(state, _BEGUN, begun + 1)
     store(state, _WAITING, 1)
     store(state, _FROM_CAMERA, 1)
@@ -238,14 +265,14 @@ def _trace_next(tree, scene, settings, camera, film, tile, scratch, state):
     trace_bundle(tree, scene, settings, bundle, scratch)
     if load(state, _FROM_CAMERA) != 0:
         store(state, _FROM_CAMERA, 0)
-        if _has_centre(camera.count) and load(state, _BEGUN) == camera.count // 2 + 1:
+        if load(state, _BEGUN) == camera.centre + 1:
             _write_first_hits(film, bundle, scratch, _block_of(tile, load(state, _BLOCK)))
     store(state, _WAITING, push_children(scene, settings, scratch, bundle, top))
 
 
 @kernel
-def render_tile(descriptor, scene, settings, camera, samples, film, tile, arrays):
-    """Fill the pixels of a ``Rectangle``, the tile; ``camera`` are the rows of the camera's affine map.
+def render_tile(descriptor, scene, settings, camera, film, tile, arrays):
+    """Fill the pixels of a ``Rectangle``, the tile, by its ``CameraRays``.
 
     ``descriptor`` is the tree's. Depth, face and normal are those of the pixel's centre, radiance is the mean of the
     samples, and rays are summed. Returns whether the tile is done. If not, ``arrays.bundles`` bundles were traced and
@@ -255,7 +282,8 @@ def render_tile(descriptor, scene, settings, camera, samples, film, tile, arrays
     state, total = pointer(arrays.state), pointer(arrays.total)
     scratch = bundle_scratch(doubles, integers, hits, settings, scratch_pointers(arrays.trace))
     tree, seen = tree_pointers(descriptor), scene_pointers(scene)
-    shooting = CameraMap(pointer(camera), pointer(samples), len(samples))
+    listed = camera.rays.shape[1] == 6
+    shooting = CameraMap(pointer(camera.rays), listed, pointer(camera.places), camera.count, camera.centre, tile)
     if load(state, _BLOCK) == 0 and load(state, _BEGUN) == 0:
         begin_bundles(scratch, settings)
     for _ in range(arrays.bundles):

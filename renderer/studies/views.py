@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Protocol
+from collections.abc import Callable, Iterator
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +14,13 @@ from renderer.arguments.points import check_points, farthest_of
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.mesh.mesh import face_normals
+from renderer.numerics.film_rays import affine_rays, along, unit_rows
 from renderer.queryable import Queries
 from renderer.rayscene.scene import RayScene
 from renderer.results.hits import points_on
 from renderer.studies.edge_on import are_edge_on
 from renderer.studies.share import ROWS as _ROWS
-from renderer.studies.share import octree_of, snapshot_of
+from renderer.studies.share import Snapshot, octree_of, snapshot_of
 from renderer.system.terminal import progress_bar
 
 Floats = NDArray[np.float64]
@@ -28,11 +29,21 @@ Floats = NDArray[np.float64]
 _MOST_CUTS = 64
 
 
-class Camera(Protocol):
-    """Anything with the rays of a camera, such as a ``PerspectiveCamera``."""
+class AffineCamera(Protocol):
+    """A camera whose rays are affine in the film position."""
 
     def rows(self, width: int, height: int) -> Floats:
         """The affine map from film to rays (6, 3): origin, its steps along x and y, direction, and its steps."""
+
+
+class Camera(Protocol):
+    """A camera with rays of its own, such as a ``FisheyeCamera``."""
+
+    def rays(self, pixels: ArrayLike, resolution: tuple[int, int]) -> tuple[Floats, Floats]:
+        """Origins and unit directions (..., 3) through film positions (..., 2); NaN for those that show nothing."""
+
+    def frame(self) -> tuple[Floats, Floats, Floats]:
+        """The axes to the right, up and forward."""
 
 
 def visible_faces(
@@ -100,24 +111,34 @@ def visible_faces(
     return seen
 
 
-def depth_map(octree: Queries | RayScene, camera: Camera, width: int, height: int, *, progress: bool = False) -> Floats:
-    """The distance from a camera to the surface at the centre of each pixel, along the ray.
+def depth_map(
+    octree: Queries | RayScene,
+    camera: Camera | AffineCamera,
+    width: int,
+    height: int,
+    *,
+    depth: Literal["distance", "z"] = "distance",
+    progress: bool = False,
+) -> Floats:
+    """The distance from a camera to the surface at the centre of each pixel.
 
     Parameters
     ----------
     octree : Octree, BruteForce or RayScene
-    camera : PerspectiveCamera or OrthographicCamera
+    camera : PerspectiveCamera, OrthographicCamera or another of the cameras
         Or anything with a method ``rows(width, height)`` as theirs, which returns an array (6, 3).
     width, height : int
         The size in pixels, from 1 to 2^16.
+    depth : {"distance", "z"}, default "distance"
+        The distance along the ray, or along the axis of the camera, as depth sensors and OpenCV have it. The latter is
+        below 0 behind a fish-eye.
     progress : bool, default False
         Show a bar on standard error if that is a terminal.
 
     Returns
     -------
     ndarray of float64, shape (height, width)
-        In scene units; inf where the ray hits nothing. The distance is along the ray, not along the axis of the
-        camera. It has the bits of ``Image.depth``.
+        In scene units; inf where the ray hits nothing. The distance along the ray has the bits of ``Image.depth``.
 
     Raises
     ------
@@ -132,25 +153,38 @@ def depth_map(octree: Queries | RayScene, camera: Camera, width: int, height: in
     >>> camera = PerspectiveCamera(eye=(0.5, 0.25, 3), target=(0.5, 0.25, 0))
     >>> depth_map(Octree.from_mesh(box()), camera, 3, 1)
     array([[inf,  2., inf]])
+
+    A wall across the view is equally far along the axis, and not along the rays.
+
+    >>> camera = PerspectiveCamera(eye=(0.5, 0.5, 2), target=(0.5, 0.5, 0), fov=60)
+    >>> [depth_map(Octree.from_mesh(box()), camera, 3, 3, depth=depth)[0].round(3) for depth in ("z", "distance")]
+    [array([1., 1., 1.]), array([1.139, 1.072, 1.139])]
     """
     surfaces = snapshot_of(octree)
     width, height = count_argument("width", width, 1, 1 << 16), count_argument("height", height, 1, 1 << 16)
-    expect(callable(getattr(camera, "rows", None)), "camera", "a camera", type(camera).__name__)
-    rows, depth = _rows_of(camera, width, height), np.empty((height, width))
-    lines, x = max(1, _ROWS // width), np.arange(width)[:, None] + 0.5
+    expect(isinstance(depth, str) and depth in ("distance", "z"), "depth", "'distance' or 'z'", repr(depth))
+    rays_at, found = _rays_of(camera, width, height), np.empty((height, width))
+    axis = _axis_of(camera, width, height) if depth == "z" else None
+    lines, x = max(1, _ROWS // width), np.arange(width) + 0.5
     with progress_bar(height, "line", flag_argument("progress", progress)) as update:
         for top in range(0, height, lines):
-            y = np.arange(top, min(top + lines, height))[:, None, None] + 0.5
-            # In the order in which pictures add them up, so that bits are the same.
-            origins = rows[0] + (rows[1] * x + rows[2] * y)
-            directions = rows[3] + (rows[4] * x + rows[5] * y)
-            good = np.isfinite(directions).all(axis=-1) & directions.any(axis=-1)
-            if not good.all():
-                expect(False, "camera", "rows with finite, non-zero directions", f"{directions[~good][0].tolist()}")
-            depth[top : top + lines] = surfaces.closest_hit(origins, _unit(directions)).t
+            y = np.arange(top, min(top + lines, height)) + 0.5
+            origins, directions = rays_at(*np.meshgrid(x, y))
+            t = _depths(surfaces, origins, directions)
+            found[top : top + lines] = t if axis is None else np.where(np.isinf(t), t, t * along(directions, axis))
             if update is not None:
                 update(len(y))
-    return depth
+    return found
+
+
+def _depths(surfaces: Queries | Snapshot, origins: Floats, directions: Floats) -> Floats:
+    """The t of rays (..., 3), inf for those whose direction is NaN."""
+    there = ~np.isnan(directions[..., 0])
+    if there.all():
+        return surfaces.closest_hit(origins, directions).t
+    t = np.full(there.shape, np.inf)
+    t[there] = surfaces.closest_hit(origins[there], directions[there]).t
+    return t
 
 
 def _one_place(argument: str, place: ArrayLike, octree: Queries) -> Floats:
@@ -159,7 +193,33 @@ def _one_place(argument: str, place: ArrayLike, octree: Queries) -> Floats:
     return rows[0]
 
 
-def _rows_of(camera: Camera, width: int, height: int) -> Floats:
+def _rays_of(camera: Any, width: int, height: int) -> Callable[[Floats, Floats], tuple[Floats, Floats]]:
+    """The rays of a camera through film positions x and y."""
+    if callable(getattr(camera, "rows", None)):
+        rows = _rows_of(camera, width, height)
+        return lambda x, y: _affine(rows, x, y)
+    expect(callable(getattr(camera, "rays", None)), "camera", "a camera", type(camera).__name__)
+    return lambda x, y: camera.rays(np.stack([x, y], axis=-1), (width, height))
+
+
+def _affine(rows: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    ways = rows[3] + (rows[4] * x[..., None] + rows[5] * y[..., None])
+    good = np.isfinite(ways).all(axis=-1) & ways.any(axis=-1)
+    if not good.all():
+        expect(False, "camera", "rows with finite, non-zero directions", f"{ways[~good][0].tolist()}")
+    return affine_rays(rows, x, y)
+
+
+def _axis_of(camera: Any, width: int, height: int) -> Floats:
+    """The direction along which a camera's z grows: across its film."""
+    if callable(getattr(camera, "frame", None)):
+        axis: Floats = camera.frame()[2]
+        return axis
+    rows = _rows_of(camera, width, height)
+    return unit_rows(np.cross(rows[1] + rows[4], rows[2] + rows[5]))
+
+
+def _rows_of(camera: AffineCamera, width: int, height: int) -> Floats:
     """A camera's affine map."""
     expected = "rows(width, height) of shape (6, 3), finite"
     try:
@@ -183,10 +243,3 @@ def _centroids(cuts: int) -> Iterator[tuple[float, float]]:
             yield (i + 1.0 / 3.0) / cuts, (j + 1.0 / 3.0) / cuts
             if i + j < cuts - 1:
                 yield (i + 2.0 / 3.0) / cuts, (j + 2.0 / 3.0) / cuts
-
-
-def _unit(vectors: Floats) -> Floats:
-    """``vec3.normalized`` of vectors (..., 3) that are not zero, with its bits."""
-    scaled = vectors * (1.0 / np.abs(vectors).max(axis=-1, keepdims=True))
-    x, y, z = (scaled[..., k : k + 1] for k in range(3))
-    return scaled * (1.0 / np.sqrt(x * x + y * y + z * z))

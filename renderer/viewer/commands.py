@@ -16,7 +16,7 @@ import numpy as np
 from renderer.errors import expect
 from renderer.mesh.load import mesh_suffix
 from renderer.mesh.mesh import Mesh
-from renderer.scene.camera import Camera, OrthographicCamera
+from renderer.scene.camera import OrthographicCamera
 from renderer.scene.fields import Fields
 from renderer.scene.light import DirectionalLight, Light
 from renderer.scene.scene import Scene
@@ -24,7 +24,7 @@ from renderer.scene.showcase import showcase_text
 from renderer.system.files import read_whole
 from renderer.viewer.protocol import AskCommand, SaveCamera, SaveScene, ViewSettings
 from renderer.viewer.shown import ShownScene, edited
-from renderer.viewer.viewpoint import camera_of, camera_toml
+from renderer.viewer.viewpoint import PageCamera, camera_of, camera_toml, page_camera
 
 # A page computes its matrix from angles, in float64: some ten roundings, each of 1e-16 of the largest number.
 _ROUNDING = 1e-12
@@ -94,7 +94,7 @@ def _as_word(file: str) -> str:
     return f"./{file}" if file.startswith("-") else file
 
 
-def _seen_by(shown: ShownScene, message: SaveCamera | SaveScene, walk: bool = False) -> Camera:
+def _seen_by(shown: ShownScene, message: SaveCamera | SaveScene, walk: bool = False) -> PageCamera:
     """The camera of a message, whose target is about the point of its axis nearest the scene's middle, if that lies
     ahead and it does not ``walk``. Its rays are those of the message's picture to the bit.
     """
@@ -192,7 +192,10 @@ def _changed_text(before: str, shown: ShownScene, asked: SaveScene) -> str:
 def _write(document: Any, shown: ShownScene, asked: SaveScene) -> None:
     """Write the values that the view changed into the tables of the scene's file."""
     scene, settings = shown.whole.scene, asked.settings
-    if not _same_view(asked, scene.camera):
+    shown_as = page_camera(scene.camera)
+    if not _same_view(asked, shown_as):
+        kept = f"the view of the file's {scene.camera.type} camera, or Save camera, which writes another file"
+        expect(shown_as is scene.camera, "save", kept, "another view")
         _update(document, ("camera",), scene.camera, _seen_by(shown, asked))
     now = edited(scene, settings.edits)
     for name, material in now.materials.items():
@@ -236,7 +239,7 @@ def _update(document: Any, keys: Sequence[str | int], old: Fields, new: Fields) 
         reduce(getitem, keys, document).pop(key, None)
 
 
-def _same_view(asked: SaveScene, camera: Camera) -> bool:
+def _same_view(asked: SaveScene, camera: PageCamera) -> bool:
     """Whether a page's view is that of ``camera`` up to the rounding of its angles."""
     right, up, forward = camera.frame()
     *axes, eye = np.array(asked.m, np.float64).reshape(4, 4)[:, :3]

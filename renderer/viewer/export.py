@@ -19,7 +19,7 @@ from renderer.picture.encoding import encoded
 from renderer.picture.exr import check_exr
 from renderer.picture.image import PLANES, exr_of
 from renderer.picture.matte import cut_out, matte_of
-from renderer.scene.camera import unit
+from renderer.scene.vectors import unit
 from renderer.viewer.passes import Pass, colored, passes_of, picture, traced_by
 from renderer.viewer.protocol import FILE, CameraMessage, Rows, Still, Turntable, packed
 from renderer.viewer.shown import ShownScene

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from renderer.diagnostics.face_phong import face_colors
 from renderer.diagnostics.false_color import Limits, false_color, limits_of, limits_of_counts, scale_colors, shades_of
 from renderer.diagnostics.ray_cost import camera_steps
+from renderer.picture.camera_rays import TILE
 from renderer.picture.encoding import encoded
 from renderer.picture.exposure import exposed
 from renderer.picture.image import Image, srgb
-from renderer.picture.prepare import TILE, PreparedScene, tiles
+from renderer.picture.prepare import PreparedScene, tiles
 from renderer.scene.camera import Camera
 from renderer.scene.scene import RenderSettings
 from renderer.trace.spawn import BOUNDED

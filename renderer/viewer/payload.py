@@ -22,6 +22,7 @@ from renderer.viewer.parts import parts_of
 from renderer.viewer.protocol import MODES
 from renderer.viewer.references import references
 from renderer.viewer.shown import ShownScene
+from renderer.viewer.viewpoint import page_camera
 
 MAGIC = 0x4853454D
 # Materials are told apart by a uint16.
@@ -38,7 +39,7 @@ def description(shown: ShownScene) -> dict[str, Any]:
         "id": shown.id,
         "name": shown.name,
         "files": shown.files,
-        "camera": scene.camera.model_dump(),
+        "camera": page_camera(scene.camera).model_dump(),
         "bounds": [corner.tolist() for corner in mesh.bounds],
         "faces": len(mesh.faces),
         "vertices": len(mesh.vertices),

@@ -12,17 +12,18 @@ from renderer.lazy import lazy
 from renderer.picture.pack import light_rows, repacked
 from renderer.picture.prepare import PreparedScene, build_octree, prepare_scene, tree_for
 from renderer.precompile import touch_viewing
-from renderer.scene.camera import unit
 from renderer.scene.change import surroundings
 from renderer.scene.hide import is_side, object_names, without
 from renderer.scene.needs import Features, needs_of
 from renderer.scene.scene import RenderSettings, Scene, load_scene, mesh_files
+from renderer.scene.vectors import unit
 from renderer.shade.records import DIRECTIONAL, REFLECTANCE, TRANSMITTANCE
 from renderer.shade.surface import SceneArrays
 from renderer.system.files import is_special
 from renderer.system.threads import available_threads
 from renderer.trace.spawn import BOUNDED
 from renderer.viewer.protocol import Edits, ViewSettings
+from renderer.viewer.viewpoint import page_camera
 
 # The most bytes of a file that may be a saved camera alone: the viewer writes some 300, and 150 for each light.
 _CAMERA_BYTES = 16384
@@ -138,7 +139,7 @@ def prepare_shown(scene: Scene, path: Path | None = None) -> ShownScene:
     prepared = replace(prepared, arrays=_lit(prepared.arrays, scene, prepared.needs))
     # The first call of a kernel loads or compiles it; the first picture should not wait for that.
     few = {"resolution": (8, 8), "samples": 1, "max_rays": 1}
-    prepared.picture(scene.camera, scene.render.model_copy(update=few), BOUNDED, threads)
+    prepared.picture(page_camera(scene.camera), scene.render.model_copy(update=few), BOUNDED, threads)
     touch_viewing(prepared)
     return ShownScene(scene, path, prepared, threads)
 

@@ -12,16 +12,20 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import ValidationError
 
 from renderer.errors import SceneError, expect
-from renderer.numerics.vec3 import normalized
-from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera
+from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera, PinholeCamera
 from renderer.scene.fields import first_fault
 from renderer.viewer.protocol import Pixel
 
+# The kinds of cameras that the page has.
+PageCamera = PerspectiveCamera | OrthographicCamera
+
 # From so many times the scene's size and distance away, rays to one point are parallel to a millionth.
 _FAR = 1e6
+# In degrees, for a camera that sees more than a plane can show.
+_USUAL_FOV = 90.0
 
 
-def camera_of(m: Sequence[float], fovy: float, distance: float = 1.0, height: float | None = None) -> Camera:
+def camera_of(m: Sequence[float], fovy: float, distance: float = 1.0, height: float | None = None) -> PageCamera:
     """The camera with matrix ``m`` (16) and vertical field of view ``fovy`` (radians, between 0 and pi).
 
     With a ``height`` it is an orthographic one, whose film is so high (scene units) and ``fovy`` says nothing. Its
@@ -34,7 +38,7 @@ def camera_of(m: Sequence[float], fovy: float, distance: float = 1.0, height: fl
     with np.errstate(over="ignore", invalid="ignore"):  # the camera refuses what is not finite
         target = eye - distance * back
     at = {"eye": _vector(eye), "target": _vector(target), "up": _vector(up)}
-    kind: type[Camera] = PerspectiveCamera if height is None else OrthographicCamera
+    kind: type[PageCamera] = PerspectiveCamera if height is None else OrthographicCamera
     film = {"fov": math.degrees(fovy)} if height is None else {"height": float(height)}
     try:
         # Not by the constructor, which warns of angles in radians: a page may zoom in so far.
@@ -43,16 +47,28 @@ def camera_of(m: Sequence[float], fovy: float, distance: float = 1.0, height: fl
         raise SceneError(f"{kind.__name__}: {first_fault(error)}") from None
 
 
+def page_camera(camera: Camera) -> PageCamera:
+    """The camera that the page shows for ``camera``: itself, or a perspective one at its place for kinds that the page
+    does not have.
+    """
+    if camera.type in ("perspective", "orthographic"):
+        assert isinstance(camera, PerspectiveCamera | OrthographicCamera)
+        return camera
+    fov = _USUAL_FOV
+    if isinstance(camera, PerspectiveCamera):
+        fov = camera.fov
+    if isinstance(camera, PinholeCamera):
+        fov = math.degrees(2.0 * math.atan(camera.height / camera.fy / 2.0))
+    return PerspectiveCamera.model_validate({**camera.model_dump(include={"eye", "target", "up"}), "fov": fov})
+
+
 def ray_through(pixel: Pixel) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Origin and unit direction of the ray through a pixel's centre, with the bits that they have in a picture."""
-    rows = camera_of(pixel.m, pixel.fovy, height=pixel.height).rows(pixel.w, pixel.h)
-    x, y = pixel.x + 0.5, pixel.y + 0.5
-    # The sum in the order of the picture's kernel.
-    origin, direction = (row + (x * in_x + y * in_y) for row, in_x, in_y in (rows[:3], rows[3:]))
-    return origin, np.array(normalized(tuple(direction.tolist())))
+    camera = camera_of(pixel.m, pixel.fovy, height=pixel.height)
+    return camera.rays((pixel.x + 0.5, pixel.y + 0.5), (pixel.w, pixel.h))
 
 
-def seen_from(camera: Camera, bounds: ArrayLike) -> tuple[float, float, float]:
+def seen_from(camera: PageCamera, bounds: ArrayLike) -> tuple[float, float, float]:
     """The point from which ``camera`` sees a scene within ``bounds`` (2, 3): its eye, or one far behind it where all
     rays are parallel.
     """
@@ -64,7 +80,7 @@ def seen_from(camera: Camera, bounds: ArrayLike) -> tuple[float, float, float]:
     return _vector(middle - _FAR * away * camera.frame()[2])
 
 
-def camera_toml(camera: Camera) -> str:
+def camera_toml(camera: PageCamera) -> str:
     """The table [camera] with which ``load_scene`` makes ``camera`` again, to the bit.
 
     >>> print(camera_toml(PerspectiveCamera(eye=(0, 1, 4), target=(0, 0, 0), fov=40)))

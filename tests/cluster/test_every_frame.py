@@ -103,7 +103,7 @@ def test_no_two_pictures_have_a_plan_in_common(bases: dict[str, Scene], base: Sc
 
 
 def test_every_argument_of_a_picture_is_varied() -> None:
-    own = signature(render).parameters.keys() - {"scene", "settings", "needs", "threads"}
+    own = signature(render).parameters.keys() - {"scene", "settings", "needs", "threads", "window"}
     assert ARGUMENTS.keys() | BITLESS.keys() == own | RenderSettings.model_fields.keys()
     assert set(View._fields) == {"camera", "chosen", "offset", "media", "planes"}
 

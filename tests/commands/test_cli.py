@@ -193,6 +193,16 @@ def test_arguments_that_make_no_sense_are_usage_errors(
     assert caught.value.code == 2 and out == "" and "error: " in err.splitlines()[-1] and "Traceback" not in err
 
 
+@pytest.mark.judges("octree-render study --camera")
+def test_a_camera_with_a_film_of_its_own_draws_no_study(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its picture has a legend below. Nothing is computed before."""
+    eye, film = "eye = [9, 9, 9]\ntarget = [0, 0, 0]", "width = 64\nheight = 48\nfx = 50\nfy = 50"
+    (tmp_path / "eye.toml").write_text(f'[camera]\ntype = "pinhole"\n{eye}\n{film}\n[materials]\n')
+    model, camera = ROOT / "scenes" / "models" / "block.ply", tmp_path / "eye.toml"
+    message = fails(capsys, "study", "sky", model, "--up", "z", "--camera", camera, "-o", tmp_path / "a.png", "--quiet")
+    assert "--camera: expected a camera whose film may have any shape, got one of type pinhole" in message
+
+
 def test_a_disk_that_fills_up_is_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

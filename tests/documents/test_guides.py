@@ -12,7 +12,15 @@ from cases import cases
 from renderer import SceneError
 from renderer.cli.main import make_parser
 from renderer.mesh.shapes import box
-from renderer.scene.camera import OrthographicCamera, PerspectiveCamera
+from renderer.scene.camera import (
+    EquirectangularCamera,
+    FisheyeCamera,
+    OpenCVFisheyeCamera,
+    OrthographicCamera,
+    PerspectiveCamera,
+    PinholeCamera,
+    ThinLensCamera,
+)
 from renderer.scene.light import DirectionalLight, PointLight
 from renderer.scene.material import Dielectric, Mirror, Phong
 from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject
@@ -39,6 +47,7 @@ def tables(text: str) -> dict[str, list[list[str]]]:
 
 
 EYE = {"eye": [0, 0, 5], "target": [0, 0, 0]}
+FILM = {"width": 64, "height": 48, "fx": 50, "fy": 50}
 # A scene of the loader with the keys alone that are needed, for each table: its class, where it stands, its own keys.
 Place = tuple[str | int, ...]
 KINDS: dict[str, tuple[type, Place, dict[str, Any]]] = {
@@ -46,6 +55,11 @@ KINDS: dict[str, tuple[type, Place, dict[str, Any]]] = {
     "[render]": (RenderSettings, ("render",), {}),
     "[camera], perspective": (PerspectiveCamera, ("camera",), EYE),
     "[camera], orthographic": (OrthographicCamera, ("camera",), {"type": "orthographic", "height": 4.0, **EYE}),
+    "[camera], thin lens": (ThinLensCamera, ("camera",), {"type": "thin_lens", "aperture": 0.1, **EYE}),
+    "[camera], pinhole": (PinholeCamera, ("camera",), {"type": "pinhole", **FILM, **EYE}),
+    "[camera], OpenCV fish-eye": (OpenCVFisheyeCamera, ("camera",), {"type": "opencv_fisheye", **FILM, **EYE}),
+    "[camera], fish-eye": (FisheyeCamera, ("camera",), {"type": "fisheye", **EYE}),
+    "[camera], equirectangular": (EquirectangularCamera, ("camera",), {"type": "equirectangular", **EYE}),
     "[materials.NAME], Phong": (Phong, ("materials", "NAME"), {}),
     "[materials.NAME], mirror": (Mirror, ("materials", "NAME"), {"type": "mirror"}),
     "[materials.NAME], dielectric": (Dielectric, ("materials", "NAME"), {"type": "dielectric"}),
@@ -58,6 +72,8 @@ KINDS: dict[str, tuple[type, Place, dict[str, Any]]] = {
 # Defaults that are words.
 WORDS: dict[str, Any] = {
     "none": (None, ()),
+    "half the width": (32.0,),
+    "half the height": (24.0,),
     "as `diffuse`": (None,),
     "as `horizon`": (None,),
     "all defaults": (RenderSettings(),),

@@ -19,16 +19,21 @@ from renderer import (
     CutWarning,
     Dielectric,
     DirectionalLight,
+    EquirectangularCamera,
+    FisheyeCamera,
     Image,
     Mirror,
+    OpenCVFisheyeCamera,
     OrthographicCamera,
     PerspectiveCamera,
     Phong,
+    PinholeCamera,
     PointLight,
     PreparedScene,
     RenderSettings,
     Scene,
     SceneObject,
+    ThinLensCamera,
     prepare,
     render,
 )
@@ -45,7 +50,18 @@ MATERIALS = {
     "glass": Dielectric(),
     "silver": Mirror(reflectance=0.9),
 }
-CAMERAS: dict[str, Any] = {"perspective": PerspectiveCamera, "orthographic": OrthographicCamera}
+CAMERAS: dict[str, Any] = {
+    "perspective": PerspectiveCamera, "orthographic": OrthographicCamera, "pinhole": PinholeCamera,
+    "fisheye": FisheyeCamera, "opencv_fisheye": OpenCVFisheyeCamera, "equirectangular": EquirectangularCamera,
+    "thin_lens": ThinLensCamera,
+}  # fmt: skip
+# Their numbers beside their place, with usual values; "size" stands for that of the scene.
+LENSES: dict[str, dict[str, list[Any]]] = {
+    "perspective": {"fov": [1.0, 40.0, 179.0]}, "orthographic": {"height": ["size"]}, "equirectangular": {},
+    "pinhole": {"fx": [8.0], "fy": [9.0], "cx": [4.0, -20.0]}, "fisheye": {"fov": [20.0, 180.0, 360.0]},
+    "opencv_fisheye": {"fx": [3.0], "fy": [4.0], "k1": [0.0, 0.1, -0.5], "k3": [0.0, 0.02]},
+    "thin_lens": {"fov": [40.0], "aperture": [0.0, "size"], "focus": ["size"]},
+}  # fmt: skip
 LIGHTS: dict[str, Any] = {"directional": DirectionalLight, "point": PointLight}
 USUAL = PerspectiveCamera(eye=(0.4, 1.3, 4.0), target=(0.4, 0.3, 0.0))
 WRONG = ["1", "", True, None, [], (1.0, 2.0), {}, 1j, "nan", (None, 0, 0), 10**400, np.float32(2.0), np.zeros(3)]
@@ -135,10 +151,13 @@ def _camera_values(rng: Random, size: float) -> Values:
     values: Values = {"type": kind, "eye": eye, "target": tuple(x * size for x in target)}
     if rng.random() < 0.5:
         values["up"] = vector(rng, 0.6)
-    lens = "fov" if kind == "perspective" else "height"
-    values[lens] = extreme(rng) if rng.random() < 0.3 else rng.choice([1.0, 40.0, 179.0] if lens == "fov" else [size])
-    if rng.random() < 0.9:
-        values[lens] = abs(values[lens])
+    for lens, usual in LENSES[kind].items():
+        choice = size if (choice := rng.choice(usual)) == "size" else choice
+        values[lens] = extreme(rng) if rng.random() < 0.3 else choice
+        if rng.random() < 0.9:
+            values[lens] = abs(values[lens])
+    if kind in ("pinhole", "opencv_fisheye"):
+        values |= {"width": 8, "height": rng.choice([8, 8, 8, 5])}
     if rng.random() < 0.03:
         values[rng.choice(list(values))] = rng.choice(WRONG)
     return values

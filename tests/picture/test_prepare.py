@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import settings as limits
 from hypothesis import strategies as st
 
-from renderer import OrthographicCamera, PerspectiveCamera, load_scene, prepare, render
+from renderer import FisheyeCamera, OrthographicCamera, PerspectiveCamera, ThinLensCamera, load_scene, prepare, render
 from renderer.picture.image import PLANES
 from renderer.picture.prepare import Octree
 from renderer.scene.scene import checked_settings
@@ -66,6 +66,33 @@ def test_a_band_of_rows_has_the_bits_that_it_has_in_the_picture(name, data):
     whole, band = (ready.picture(ready.scene.camera, chosen, BOUNDED, 2, band=rows) for rows in (None, (first, end)))
     for plane in PLANES:
         assert getattr(band, plane).tobytes() == getattr(whole, plane)[first:end].tobytes(), plane
+
+
+LENSES = {
+    "perspective": None,
+    "fisheye": FisheyeCamera(eye=(0.5, 2.0, 5.0), target=(0.0, 0.8, 0.0), fov=150),
+    "thin lens": ThinLensCamera(eye=(0.5, 2.0, 5.0), target=(0.0, 0.8, 0.0), aperture=0.3),
+}
+
+
+@pytest.mark.judges("render")
+@cases("lens", sorted(LENSES))
+@cases("window", [(0, 0, 75, 50), (33, 9, 34, 10), (1, 32, 74, 50), (40, 0, 75, 7)])
+def test_a_window_has_the_bits_that_it_has_in_the_picture(lens, window):
+    options = {"camera": LENSES[lens], "resolution": (75, 50), "samples": 4, "max_depth": 2}
+    ready = prepare(load_scene("scenes/three_models.toml"))
+    whole, part = render(ready, **options, threads=1), render(ready, **options, window=window, threads=2)
+    left, top, right, bottom = window
+    for plane in PLANES:
+        assert getattr(part, plane).tobytes() == getattr(whole, plane)[top:bottom, left:right].tobytes(), plane
+
+
+@pytest.mark.judges("render")
+@cases("window", [(0, 0, 76, 50), (-1, 0, 5, 5), (5, 0, 5, 5), (0, 9, 5, 3), (0, 0, 5), (0.0, 0.0, 5.0, 5.0), "all"])
+def test_a_window_that_is_none_is_refused(window):
+    ready = prepare(load_scene("scenes/stairs.toml"))
+    with pytest.raises(ValueError, match=r"window: expected (left < right.* within 75 x 50 pixels, got|real numbers)"):
+        render(ready, resolution=(75, 50), window=window)
 
 
 def test_a_band_takes_little_more_memory_than_its_own_rows():

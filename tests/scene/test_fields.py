@@ -11,24 +11,44 @@ from cases import cases
 from renderer import (
     Dielectric,
     DirectionalLight,
+    EquirectangularCamera,
+    FisheyeCamera,
     Floor,
     Mirror,
+    OpenCVFisheyeCamera,
     OrthographicCamera,
     PerspectiveCamera,
     Phong,
+    PinholeCamera,
     PointLight,
     RenderSettings,
     Scene,
     SceneError,
     SceneObject,
     Sky,
+    ThinLensCamera,
     load_scene,
 )
 from renderer.mesh.shapes import box
 
 # Colours above 1 are allowed.
 pytestmark = [pytest.mark.filterwarnings("ignore::renderer.SceneWarning"), pytest.mark.judges(
-    "Floor", "OrthographicCamera", "RenderSettings", "Scene", "scene.ambient", "scene.background", "scene.camera",
+    "EquirectangularCamera", "FisheyeCamera", "Floor", "OpenCVFisheyeCamera", "OrthographicCamera", "PinholeCamera",
+    "ThinLensCamera", "scene.camera.equirectangular.eye", "scene.camera.equirectangular.target",
+    "scene.camera.equirectangular.type", "scene.camera.equirectangular.up", "scene.camera.fisheye.eye",
+    "scene.camera.fisheye.fov", "scene.camera.fisheye.target", "scene.camera.fisheye.type",
+    "scene.camera.fisheye.up", "scene.camera.opencv_fisheye.cx", "scene.camera.opencv_fisheye.cy",
+    "scene.camera.opencv_fisheye.eye", "scene.camera.opencv_fisheye.fx", "scene.camera.opencv_fisheye.fy",
+    "scene.camera.opencv_fisheye.height", "scene.camera.opencv_fisheye.k1", "scene.camera.opencv_fisheye.k2",
+    "scene.camera.opencv_fisheye.k3", "scene.camera.opencv_fisheye.k4", "scene.camera.opencv_fisheye.skew",
+    "scene.camera.opencv_fisheye.target", "scene.camera.opencv_fisheye.type", "scene.camera.opencv_fisheye.up",
+    "scene.camera.opencv_fisheye.width", "scene.camera.pinhole.cx", "scene.camera.pinhole.cy",
+    "scene.camera.pinhole.eye", "scene.camera.pinhole.fx", "scene.camera.pinhole.fy", "scene.camera.pinhole.height",
+    "scene.camera.pinhole.skew", "scene.camera.pinhole.target", "scene.camera.pinhole.type",
+    "scene.camera.pinhole.up", "scene.camera.pinhole.width", "scene.camera.thin_lens.aperture",
+    "scene.camera.thin_lens.eye", "scene.camera.thin_lens.focus", "scene.camera.thin_lens.fov",
+    "scene.camera.thin_lens.target", "scene.camera.thin_lens.type", "scene.camera.thin_lens.up",
+    "RenderSettings", "Scene", "scene.ambient", "scene.background", "scene.camera",
     "scene.camera.orthographic.eye", "scene.camera.orthographic.height", "scene.camera.orthographic.target",
     "scene.camera.orthographic.type", "scene.camera.orthographic.up", "scene.camera.perspective.eye",
     "scene.camera.perspective.fov", "scene.camera.perspective.target", "scene.camera.perspective.type",
@@ -52,10 +72,16 @@ pytestmark = [pytest.mark.filterwarnings("ignore::renderer.SceneWarning"), pytes
 
 BOX = box()
 NEEDED = object()
+FILM = {"eye": (0, 0, 5), "target": (0, 0, 0), "width": 64, "height": 48, "fx": 50, "fy": 50}
 # For each class the fields without which it cannot be.
 LEAST: dict[type, dict[str, Any]] = {
     PerspectiveCamera: {"eye": (0, 0, 5), "target": (0, 0, 0)},
     OrthographicCamera: {"eye": (0, 0, 5), "target": (0, 0, 0), "height": 2},
+    FisheyeCamera: {"eye": (0, 0, 5), "target": (0, 0, 0)},
+    EquirectangularCamera: {"eye": (0, 0, 5), "target": (0, 0, 0)},
+    ThinLensCamera: {"eye": (0, 0, 5), "target": (0, 0, 0), "aperture": 0.1},
+    PinholeCamera: FILM,
+    OpenCVFisheyeCamera: FILM,
     DirectionalLight: {"direction": (0, -1, 0)},
     PointLight: {"position": (0, 1, 0)},
     Phong: {},
@@ -116,6 +142,16 @@ CAMERA = {
     "eye": ANY_EYE._replace(takes=[*ANY_EYE.takes, *same((0.0, 0.0, 2.0**126))]), "target": triple(NEEDED),
     "up": triple((0.0, 1.0, 0.0))._replace(takes=[*same((1.0, 2.0, 3.0)), ([0, 1, 1], (0.0, 1.0, 1.0))]),
 }  # fmt: skip
+PIXELS = Field(NEEDED, same(1, 65536), [0, -1, 65537, 4.0, True, "4"])
+CALIBRATED = {
+    **CAMERA, "width": PIXELS, "height": PIXELS,
+    **dict.fromkeys(("fx", "fy"), number(NEEDED, 1e-9, 1e9, refused=(0.0, -1.0, 1.1e9, BEYOND))),
+    **{
+        name: number(middle, -1e9, 1e9, refused=(BEYOND,))._replace(refuses=[True, "1", [1.0], math.nan, BEYOND])
+        for name, middle in (("cx", 32.0), ("cy", 24.0))
+    },
+    "skew": number(0.0, -1e9, 1e9, refused=(-1.1e9, BEYOND)),
+}  # fmt: skip
 FIELDS: dict[type, dict[str, Field]] = {
     PerspectiveCamera: {
         "type": kind("perspective"), **CAMERA,
@@ -124,6 +160,24 @@ FIELDS: dict[type, dict[str, Field]] = {
     OrthographicCamera: {
         "type": kind("orthographic"), **CAMERA,
         "height": number(NEEDED, TINY, 2.0**126, refused=(0.0, -1.0, math.nextafter(2.0**126, BEYOND), BEYOND)),
+    },
+    FisheyeCamera: {
+        "type": kind("fisheye"), **CAMERA,
+        "fov": number(180.0, TINY, 360.0, refused=(0.0, -1.0, math.nextafter(360, BEYOND), BEYOND)),
+    },
+    EquirectangularCamera: {"type": kind("equirectangular"), **CAMERA},
+    ThinLensCamera: {
+        "type": kind("thin_lens"), **CAMERA,
+        "fov": number(45.0, TINY, math.nextafter(180, 0), refused=(0.0, -1.0, 180.0, BEYOND)),
+        "aperture": number(NEEDED, 0.0, 2.0**126, refused=(-TINY, math.nextafter(2.0**126, BEYOND), BEYOND)),
+        "focus": Field(
+            None, [(None, None), *same(TINY, 4.0, 2.0**126)], [True, "1", [1.0], math.nan, 0.0, -1.0, BEYOND]
+        ),
+    },
+    PinholeCamera: {"type": kind("pinhole"), **CALIBRATED},
+    OpenCVFisheyeCamera: {
+        "type": kind("opencv_fisheye"), **CALIBRATED,
+        **dict.fromkeys(("k1", "k2", "k3", "k4"), number(0.0, -1e9, 1e9, refused=(1.1e9, BEYOND))),
     },
     DirectionalLight: {
         "type": kind("directional"), "direction": triple(NEEDED, (0, 0, 0), (0.0, -0.0, 0.0)),
@@ -188,7 +242,7 @@ FIELDS: dict[type, dict[str, Field]] = {
         "camera": Field(NEEDED, [
             (LEAST[PerspectiveCamera], PerspectiveCamera(**LEAST[PerspectiveCamera])),
             ({"type": "orthographic", **LEAST[OrthographicCamera]}, OrthographicCamera(**LEAST[OrthographicCamera])),
-        ], [3, None, {}, {"type": "fisheye", **LEAST[PerspectiveCamera]}, Phong()]),
+        ], [3, None, {}, {"type": "plenoptic", **LEAST[PerspectiveCamera]}, Phong()]),
         "materials": Field(NEEDED, [
             ({}, {}), ({"a": {}}, {"a": Phong()}), ({"a": {"type": "dielectric"}}, {"a": Dielectric()}),
             ({"a": {"type": "mirror"}, "b": Phong()}, {"a": Mirror(), "b": Phong()}),

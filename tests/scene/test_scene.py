@@ -174,7 +174,7 @@ FAULTS = [
     ("", "ambient = true", "ambient", []),
     ("[render]", "resolution = [8, 1000000]", "render.resolution.1", ["16384", "1000000"]),
     ("[render]", "samples = 3", "render", ["samples", "square number", "got 3"]),
-    ("[camera]", 'type = "fisheye"', "camera", ["fisheye", "perspective", "orthographic"]),
+    ("[camera]", 'type = "plenoptic"', "camera", ["plenoptic", "perspective", "orthographic"]),
     ("[camera]", "type = [3]", "camera", ["3"]),
     ("[camera]", "eye = [0, 0]", "camera.eye", ["[0, 0]"]),
     ("[camera]", "target = [0, 1, 5]", "camera", ["target != eye"]),

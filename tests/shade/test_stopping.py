@@ -27,6 +27,7 @@ from renderer import (
 )
 from renderer.cli.main import main
 from renderer.mesh.shapes import icosphere
+from renderer.picture import camera_rays
 from renderer.picture import prepare as prepared_scene
 from renderer.trace.spawn import BOUNDED
 
@@ -116,7 +117,7 @@ def test_the_cut_depends_on_no_thread_tile_or_pause(monkeypatch: pytest.MonkeyPa
     assert same(rendered(half_mirrors(), threads=3, samples=samples), expected)
     ready = prepare(half_mirrors())
     monkeypatch.setattr(prepared_scene, "_bundles_in_a_row", lambda tree: 1)
-    monkeypatch.setattr(prepared_scene, "TILE", 16)
+    monkeypatch.setattr(camera_rays, "TILE", 16)
     assert same(rendered(ready, threads=2, samples=samples), expected)
 
 

@@ -7,7 +7,21 @@ import numpy as np
 import pytest
 from cases import cases
 
-from renderer import Mesh, Octree, OrthographicCamera, PerspectiveCamera, Phong, Scene, SceneObject, render
+from renderer import (
+    EquirectangularCamera,
+    FisheyeCamera,
+    Mesh,
+    Octree,
+    OpenCVFisheyeCamera,
+    OrthographicCamera,
+    PerspectiveCamera,
+    Phong,
+    PinholeCamera,
+    Scene,
+    SceneObject,
+    ThinLensCamera,
+    render,
+)
 from renderer.mesh.shapes import box, grid, icosphere, torus
 from renderer.studies import (
     ambient_occlusion,
@@ -30,6 +44,15 @@ pytestmark = pytest.mark.judges("Image", "studies.Scan", "studies.depth_map", "s
 CAMERAS = [
     PerspectiveCamera(eye=(0.5, 1.5, 3.0), target=(0.0, 0.1, 0.0), fov=40.0),
     OrthographicCamera(eye=(0.5, 1.5, 3.0), target=(0.0, 0.1, 0.0), height=2.5),
+    PinholeCamera(
+        eye=(0.5, 1.5, 3.0), target=(0.0, 0.1, 0.0), width=122, height=94, fx=120.0, fy=110.0, cx=50.0, skew=7.0
+    ),
+    FisheyeCamera(eye=(0.5, 1.5, 3.0), target=(0.0, 0.1, 0.0), fov=70.0),
+    EquirectangularCamera(eye=(0.5, 0.3, 0.3), target=(0.0, 0.1, 0.0)),
+    OpenCVFisheyeCamera(
+        eye=(0.5, 1.5, 3.0), target=(0.0, 0.1, 0.0), width=61, height=47, fx=50.0, fy=60.0, k1=0.1, k3=-0.05
+    ),
+    ThinLensCamera(eye=(0.5, 1.5, 3.0), target=(0.0, 0.1, 0.0), fov=40.0, aperture=0.2),
 ]
 
 
@@ -106,6 +129,22 @@ def test_depths_have_the_bits_of_pictures(camera, samples):
     assert depth.shape == (47, 61) and 0.1 < np.isfinite(depth).mean() < 0.9
 
 
+@cases("camera", CAMERAS)
+def test_z_is_the_part_of_the_distance_along_the_axis(camera):
+    octree, seen = Octree.from_mesh(torus()), (61, 47)
+    z = depth_map(octree, camera, *seen, depth="z")
+    origins, directions = camera.primary_rays(seen)
+    there = ~np.isnan(directions).any(axis=-1)
+    hits = octree.closest_hit(origins[there], directions[there])
+    expected = (hits.points - camera.eye) @ camera.frame()[2]
+    np.testing.assert_array_equal(np.isinf(z[there]), ~hits.hit)
+    assert np.isinf(z[~there]).all() and hits.hit.any()
+    np.testing.assert_allclose(z[there][hits.hit], expected[hits.hit], rtol=1e-12)
+    if hasattr(camera, "rows"):  # of a camera of one's own, too
+        own = depth_map(octree, _camera_of(camera.rows(*seen)), *seen, depth="z")
+        np.testing.assert_allclose(own, z, rtol=1e-13)
+
+
 @cases("integer", [np.int16, np.uint64])
 def test_counts_may_be_integers_of_numpy(integer):
     octree, flat = Octree.from_mesh(torus()), Octree.from_mesh(box())
@@ -148,6 +187,8 @@ def test_rows_of_a_camera_of_ones_own_may_be_a_list():
         (lambda o: depth_map(o, CAMERAS[0], 0, 5), "width", "from 1 to 65536"),
         (lambda o: depth_map(o, CAMERAS[0], 5, 2.5), "height", "from 1 to 65536"),
         (lambda o: depth_map(o, "camera", 5, 5), "camera", "a camera, got str"),
+        (lambda o: depth_map(o, CAMERAS[0], 5, 5, depth="Z"), "depth", "'distance' or 'z', got 'Z'"),
+        (lambda o: depth_map(o, CAMERAS[2], 5, 50), "resolution", "122 x 94.* of that shape, got 5 x 50"),
         (
             lambda o: depth_map(o, PerspectiveCamera, 5, 5),
             "camera",

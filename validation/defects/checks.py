@@ -22,7 +22,7 @@ from validation.hits.section import HitEffort, check_leaks, check_mesh
 from validation.hits.walks import check_walks
 from validation.job import Job
 from validation.pictures.plan import PictureEffort
-from validation.pictures.section import check_scene
+from validation.pictures.section import check_cameras, check_scene
 from validation.pictures.unseen import check_unseen
 from validation.promises import section as promises
 from validation.queries import section
@@ -60,10 +60,11 @@ def run(group: str) -> list[Gate]:
 
 
 def pictures(job: Job) -> Iterator[Gate]:
-    """Two scenes: AOVs, the ladder's rungs against their references, and random paths through glass."""
+    """Two scenes: AOVs, the ladder's rungs against their references, and random paths through glass. Cameras."""
     for name, effort in _SCENES.items():
         _, found = check_scene(name, "", load_scene(SCENES / f"{name}.toml"), effort, job)
         yield from found
+    yield from check_cameras(job)
 
 
 def extreme(first: int, last: int) -> Callable[[Job], Iterator[Gate]]:

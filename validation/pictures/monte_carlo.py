@@ -83,6 +83,8 @@ def can_judge(scene: Scene) -> str | None:
     """Why random paths cannot judge ``scene``; None if they can."""
     if not scene.render.shadows:
         return mitsuba_path.SHADOWLESS
+    if scene.camera.film_size is not None:
+        return "a calibrated camera, whose film is not the square that random paths are shown on"
     if any(isinstance(scene.materials[i.material], Dielectric) for i in scene.instances):
         return None
     return "nothing is random without a dielectric; one path a ray is the picture"

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from renderer.scene.scene import Scene
+from renderer.scene.scene import Scene, checked_settings
 from validation.pictures import ladder, monte_carlo
 from validation.pictures.compare import Picture
 from validation.pictures.ladder import Rung
@@ -96,6 +96,6 @@ def plan_pictures(scene: Scene, effort: PictureEffort) -> Plan:
 
 def _resolution(scene: Scene, size: int) -> tuple[int, int]:
     """Width and height in the scene's own aspect ratio, with the longer side ``size``."""
-    width, height = scene.render.resolution
+    width, height = checked_settings(scene.render, {}, scene.camera).resolution
     scale = size / max(width, height)
     return max(_SMALLEST, round(width * scale)), max(_SMALLEST, round(height * scale))

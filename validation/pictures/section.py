@@ -14,6 +14,7 @@ from typing import Any
 
 from renderer.picture.image import srgb
 from renderer.picture.render import render
+from renderer.scene.camera import Camera, PinholeCamera, ThinLensCamera
 from renderer.scene.scene import Scene, load_scene
 from validation.gates import Gate
 from validation.job import Job, Task
@@ -29,6 +30,13 @@ from validation.references.mitsuba.scene import in_float32
 from validation.scenes import SCENE_CASES
 
 AOVS = "Mitsuba's primary hits (scalar_rgb)"
+# Kinds that no scene of the suite has.
+_PLACE: dict[str, Any] = {"eye": (1.0, 2.0, 5.0), "target": (0.2, 0.5, 0.0), "up": (0.1, 1.0, 0.0)}
+_FILM = (96, 64)
+_CAMERAS = (
+    PinholeCamera(**_PLACE, width=96, height=64, fx=100.0, fy=100.0, cx=30.0, cy=40.0),
+    ThinLensCamera(**_PLACE, fov=37.0, aperture=0.3, focus=4.0),
+)
 
 
 def steps(job: Job) -> int:
@@ -48,6 +56,7 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
         found += passed
     result: dict[str, Any] = {"scenes": records, "costs": costs_of(records)}
     if job.own:
+        found += check_cameras(job)
         result["unseen"], passed = unseen.check_unseen(job)
         found += passed
         job.step("pictures: the main scene, 9 samples a pixel")
@@ -92,6 +101,11 @@ def check_scene(
         record["paths"], passed = theirs[monte_carlo.PATHS]
         found += passed
     return record, found
+
+
+def check_cameras(job: Job) -> list[Gate]:
+    """Compare the rays of cameras that no scene of the suite has with those of Mitsuba's sensors."""
+    return [_camera_gate(camera.type, camera, _FILM, job) for camera in _CAMERAS]
 
 
 def _theirs(name: str, scene: Scene, plan: Plan, job: Job) -> dict[Any, Any]:
@@ -139,22 +153,24 @@ def _check_aovs(
     name: str, scene: Scene, resolution: tuple[int, int], job: Job, made: tuple[Any, float]
 ) -> tuple[dict[str, Any], list[Gate]]:
     """Compare the camera's rays with those of Mitsuba's own sensor, and then their hits, which Mitsuba has ``made``."""
-    shift = mitsuba_camera.largest_distance(scene.camera, max(resolution))
-    limit, reason = (
-        job.thresholds.pictures.camera_pixels,
-        "our camera rays are those of Mitsuba's sensor; both pictures use ours",
-    )
-    judged = (f"{type(scene.camera).__name__}.rows",)
-    camera = Gate(
-        "images", f"{name}, camera", "distance of camera rays, pixels", shift, "at most", limit, reason, judged
-    )
+    cameras = [] if mitsuba_camera.can_judge(scene.camera) else [_camera_gate(name, scene.camera, resolution, job)]
     theirs, seconds = made
     ours = picture(scene, resolution, "bounded", max_depth=0)
     record, found, off = aovs.compare(name, scene, ours, theirs, job.thresholds.aovs)
     if not job.own:
         found = [verdict.primary_gate(f"{name}, AOVs", scene, ours, off)]
-    told = {"reference_name": AOVS, "reference_seconds": seconds, "size": list(resolution), "camera_pixels": shift}
-    return told | record, [camera, *found]
+    told = {"reference_name": AOVS, "reference_seconds": seconds, "size": list(resolution)}
+    if cameras:
+        told["camera_pixels"] = cameras[0].value
+    return told | record, [*cameras, *found]
+
+
+def _camera_gate(name: str, camera: Camera, resolution: tuple[int, int], job: Job) -> Gate:
+    """The distance of our rays from those of Mitsuba's sensor."""
+    shift, limit = mitsuba_camera.largest_distance(camera, resolution), job.thresholds.pictures.camera_pixels
+    reason, kind = "our camera rays are those of Mitsuba's sensor; both pictures use ours", type(camera).__name__
+    judged = (kind, f"{kind}.rows")
+    return Gate("images", f"{name}, camera", "distance of camera rays, pixels", shift, "at most", limit, reason, judged)
 
 
 def _announced(name: str, scene: Scene, drawn: Drawn, job: Job) -> list[str]:

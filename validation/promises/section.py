@@ -134,7 +134,18 @@ QUERIES = {
     "piles of hits": Check(lambda: check_piles(_random()), _of_both("all_hits")),
 }
 PICTURES = {
-    "cameras": Check(lambda: check_cameras(_random(), _PLACED), ("PerspectiveCamera", "OrthographicCamera", "Image")),
+    "cameras": Check(
+        lambda: check_cameras(_random(), _PLACED),
+        (
+            "PerspectiveCamera",
+            "OrthographicCamera",
+            "PinholeCamera",
+            "FisheyeCamera",
+            "OpenCVFisheyeCamera",
+            "EquirectangularCamera",
+            "Image",
+        ),
+    ),
     "objects placed": Check(
         lambda: check_placing(_random(), _PLACED), ("SceneObject", "Scene.instances", "Mesh.transformed")
     ),

@@ -49,7 +49,7 @@ def _bsdf(material: Material) -> Any:
 
 def _sensor(scene: Scene, size: int) -> dict[str, Any]:
     camera = scene.camera
-    if not isinstance(camera, PerspectiveCamera):
+    if not isinstance(camera, PerspectiveCamera) or camera.type != "perspective":
         raise ValueError(f"scene: expected a perspective camera, got {camera.type}")
     look = mi.ScalarTransform4f().look_at(origin=list(camera.eye), target=list(camera.target), up=list(camera.up))
     film = {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}}

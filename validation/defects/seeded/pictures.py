@@ -88,20 +88,20 @@ def _encoded_twice(sound: Any, linear: Any) -> Any:
 
 
 def _dithered(image: Any) -> None:
-    from renderer.picture.prepare import TILE
+    from renderer.picture.camera_rays import TILE
 
     columns = np.arange(image.radiance.shape[1])[2 * TILE :]
     image.radiance[:, 2 * TILE :] *= 1.0 + 2e-4 * np.array([0, 1, -1])[columns % 3, None]
 
 
 def _last_of_tile(image: Any) -> None:
-    from renderer.picture.prepare import TILE
+    from renderer.picture.camera_rays import TILE
 
     image.radiance[TILE - 1 :: TILE, TILE - 1 :: TILE] *= 1.01
 
 
 def _shown_miss(image: Any) -> None:
-    from renderer.picture.prepare import TILE
+    from renderer.picture.camera_rays import TILE
 
     image.face[:, 2 * TILE :][image.face[:, 2 * TILE :] < 0] = 0
 
@@ -177,6 +177,9 @@ _CHANGES: dict[str, Change] = {
     "camera rays 0.1 pixel off their pixel's centre": Rule("place-in-pixel", element(0, "_ + 0.1")),
     "orthographic film 1 % too wide": Wrapped("OrthographicCamera.rows", _wider),
     "field of view + 0.3 degrees": Wrapped("PerspectiveCamera.rows", _wider_angle),
+    "principal point half a pixel off": after("PinholeCamera.rows", _shifted(0.5)),
+    "a fish-eye is stereographic": Rule("equidistant", value("2.0 * np.arctan(0.5 * (_))")),
+    "a lens 2 % too wide": Rule("point-on-lens", value("1.02 * (_)")),
     "a light missing": after("light_rows", lambda rows: rows[:-1]),
     "point light + 5 %": after("light_rows", _scaled(np.s_[-1:, 4:], 1.05)),
     "light moved by 0.05": after("light_rows", _moved_light),

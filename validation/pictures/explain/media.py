@@ -67,10 +67,10 @@ class MediaJudge:
         in their rays by the rule for the stack.
         """
         found = []
-        rows = self._scene.camera.rows(self._width, len(picture))
+        resolution = self._width, len(picture)
         around = self._around(np.asarray(self._scene.camera.eye))
         for row, column in pixels:
-            tree = self._ours.pixel(rows, row, column)
+            tree = self._ours.pixel(self._scene.camera, resolution, row, column)
             said = [*wrong_sum(tree, picture[row, column]), *self._walk(tree, around)]
             wrong = next((text for text in said if text not in WHYS), None)
             found.append(Ruled(row, column, next(iter(said), None) if wrong is None else None, wrong))

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.diagnostics.ray_step import Aim, Ray, Steps, SurfaceHit
+from renderer.scene.camera import Camera
 from renderer.shade.records import DIELECTRIC, KIND, TRANSMITTANCE
 from renderer.trace.batch import check_rays
 from renderer.trace.closest import closest_hits
@@ -23,16 +24,14 @@ class Ours:
     max_depth: int
     shadows: bool
 
-    def tree(self, origin: Vector, direction: Vector) -> Node:
-        """The tree of a camera ray."""
-        ray = self.steps.camera_ray(_tuple(origin), _tuple(direction))
-        # A picture takes the media around its camera's eye, for all points of an orthographic film.
-        return self._follow(ray._replace(media=tuple(self.steps.arrays.media.tolist())), np.ones(3))
-
-    def pixel(self, rows: NDArray[np.float64], row: int, column: int) -> Node:
-        """The tree of the ray through a pixel's centre, to the bit as the kernel has it of the camera's ``rows``."""
-        x, y = column + 0.5, row + 0.5
-        return self.tree(rows[0] + (x * rows[1] + y * rows[2]), rows[3] + (x * rows[4] + y * rows[5]))
+    def pixel(self, camera: Camera, resolution: tuple[int, int], row: int, column: int) -> Node:
+        """The tree of the ray through a pixel's centre, to the bit as the kernel has it."""
+        origin, direction = map(_tuple, camera.rays((column + 0.5, row + 0.5), resolution))
+        # Dividing by the length again could change a bit. A picture takes the media around its camera's eye, for all
+        # points of an orthographic film.
+        media = tuple(self.steps.arrays.media.tolist())
+        ray = self.steps.camera_ray(origin, direction)._replace(direction=direction, media=media)
+        return self._follow(ray, np.ones(3))
 
     def step(self, node: Node) -> Node:
         """One step: a ray's hit, and the rays that leave there. The children have hit nothing, and no shadow is traced.

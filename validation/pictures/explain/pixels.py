@@ -82,9 +82,8 @@ class Explainer:
 
     def __init__(self, prepared: PreparedScene, resolution: tuple[int, int]) -> None:
         scene = prepared.scene
-        self._scene, self._width = scene, resolution[0]
+        self._scene, self._resolution = scene, resolution
         self._origins, self._directions = primary_rays(scene.camera, *resolution)
-        self._rows = scene.camera.rows(*resolution)
         self._mesh = _mesh_of(scene)
         self._theirs = Trees(scene, scene.render.max_depth)
         self._ours = {
@@ -139,10 +138,10 @@ class Explainer:
         return found
 
     def _tree(self, rule: Rule, row: int, column: int) -> Node:
-        return self._ours[rule].pixel(self._rows, row, column)
+        return self._ours[rule].pixel(self._scene.camera, self._resolution, row, column)
 
     def _their_tree(self, row: int, column: int) -> Node:
-        at = row * self._width + column
+        at = row * self._resolution[0] + column
         return self._theirs.tree(self._origins[at], self._directions[at])
 
     def _ours_wrong(

@@ -9,50 +9,88 @@ import numpy as np
 from numpy.typing import NDArray
 
 import validation.references.mitsuba.scene  # noqa: F401  # selects the variant
-from renderer.scene.camera import OrthographicCamera, PerspectiveCamera, primary_rays
+from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera, PinholeCamera, ThinLensCamera
+from renderer.scene.cameras.thin_lens import lens_places
 
-Camera = PerspectiveCamera | OrthographicCamera
 Vector = NDArray[np.float64]
+# The samples of a pixel that are compared where each starts at another point of a lens.
+_SAMPLES = 9
 
 
-def largest_distance(camera: Camera, size: int) -> float:
-    """The largest distance in pixels between our ray and Mitsuba's through a pixel's centre, for size x size pixels.
+def can_judge(camera: Camera) -> str | None:
+    """Why Mitsuba has no sensor like ``camera``; None if it has one."""
+    if isinstance(camera, PinholeCamera):
+        square = camera.skew == 0.0 and camera.fx == camera.fy
+        return None if square else "a pinhole camera whose pixels are not square"
+    kept = isinstance(camera, PerspectiveCamera | OrthographicCamera)
+    return None if kept else f"a camera of type {camera.type}"
 
-    Measured at the distance of the camera's target, over 33 x 33 pixels that include the corners.
+
+def largest_distance(camera: Camera, resolution: tuple[int, int]) -> float:
+    """The largest distance in pixels between our ray and Mitsuba's through a place of a film of some width and height.
+
+    Measured at the distance of the camera's target and at half of it, over 33 x 33 pixels that include the corners.
     """
-    sensor = mi.load_dict(_sensor(camera, size))
-    origins, directions = primary_rays(camera, size, size)
-    steps = np.unique(np.linspace(0, size - 1, 33).astype(int))
-    away = float(np.linalg.norm(np.subtract(camera.target, camera.eye)))
+    width, height = resolution
+    sensor = mi.load_dict(_sensor(camera, width, height))
+    columns, rows = (np.unique(np.linspace(0, size - 1, 33).astype(int)) for size in resolution)
+    x, y = np.meshgrid(columns + 0.5, rows + 0.5)
     worst = 0.0
-    for y in steps:
-        for x in steps:
-            ray, _ = sensor.sample_ray(0.0, 0.5, mi.Point2f((x + 0.5) / size, (y + 0.5) / size), mi.Point2f(0.5))
-            row = y * size + x
-            theirs = _at(np.array(ray.o, np.float64), np.array(ray.d, np.float64), camera, away)
-            worst = max(worst, float(np.linalg.norm(_at(origins[row], directions[row], camera, away) - theirs)))
-    return worst / _pixel(camera, size, away)
+    for number in range(_SAMPLES if isinstance(camera, ThinLensCamera) else 1):
+        u, v = lens_places(x, y, number)
+        ours = camera._sample_rays(x, y, width, height, number, _SAMPLES)
+        for at in np.ndindex(x.shape):
+            # The x axis of Mitsuba's cameras points left.
+            lens = mi.Point2f(float(1.0 - u[at]), float(v[at]))
+            ray, _ = sensor.sample_ray(0.0, 0.5, mi.Point2f(float(x[at]) / width, float(y[at]) / height), lens)
+            theirs = np.array(ray.o, np.float64), np.array(ray.d, np.float64)
+            worst = max(worst, _distance((ours[0][at], ours[1][at]), theirs, camera, height))
+    return worst
+
+
+def _distance(ours: tuple[Vector, Vector], theirs: tuple[Vector, Vector], camera: Camera, height: int) -> float:
+    """The larger distance in pixels of two rays where they cross the planes through the target and half-way to it."""
+    target = float(np.linalg.norm(np.subtract(camera.target, camera.eye)))
+    apart = ((_at(*ours, camera, away) - _at(*theirs, camera, away), away) for away in (target, 0.5 * target))
+    return max(float(np.linalg.norm(difference)) / _pixel(camera, height, away) for difference, away in apart)
 
 
 def _at(o: Vector, d: Vector, camera: Camera, away: float) -> Vector:
-    """The point where a ray crosses the plane through the target that faces the camera."""
+    """The point where a ray crosses the plane that faces the camera, so far away from it."""
     _, _, forward = camera.frame()
     t = (away - float(np.dot(o - np.asarray(camera.eye), forward))) / float(np.dot(d, forward))
     return o + t * d
 
 
-def _pixel(camera: Camera, size: int, away: float) -> float:
-    """A pixel's height at the target, in scene units."""
+def _pixel(camera: Camera, height: int, away: float) -> float:
+    """A pixel's height in scene units, so far away."""
     if isinstance(camera, OrthographicCamera):
-        return camera.height / size
-    return float(2.0 * away * np.tan(np.radians(camera.fov) / 2.0) / size)
+        return camera.height / height
+    return float(2.0 * away * np.tan(np.radians(_fov(camera)) / 2.0) / height)
 
 
-def _sensor(camera: Camera, size: int) -> dict[str, object]:
+def _fov(camera: Camera) -> float:
+    """The vertical field of view in degrees."""
+    if isinstance(camera, PinholeCamera):
+        return float(np.degrees(2.0 * np.arctan(0.5 * camera.height / camera.fy)))
+    assert isinstance(camera, PerspectiveCamera)
+    return camera.fov
+
+
+def _sensor(camera: Camera, width: int, height: int) -> dict[str, object]:
     to_world = mi.ScalarTransform4f().look_at(origin=list(camera.eye), target=list(camera.target), up=list(camera.up))
-    film = {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}}
-    if isinstance(camera, PerspectiveCamera):
-        return {"type": "perspective", "fov": camera.fov, "fov_axis": "y", "to_world": to_world, "film": film}
-    half = camera.height / 2.0
-    to_world = to_world @ mi.ScalarTransform4f().scale([half, half, 1.0])
-    return {"type": "orthographic", "to_world": to_world, "film": film}
+    film = {"type": "hdrfilm", "width": width, "height": height, "rfilter": {"type": "box"}}
+    if isinstance(camera, OrthographicCamera):
+        # As wide as high: a film of another shape has its width in place of its height.
+        half = 0.5 * camera.height * width / height
+        to_world = to_world @ mi.ScalarTransform4f().scale([half, half, 1.0])
+        return {"type": "orthographic", "to_world": to_world, "film": film}
+    sensor = {"type": "perspective", "fov": _fov(camera), "fov_axis": "y", "to_world": to_world, "film": film}
+    if isinstance(camera, ThinLensCamera):
+        focus = camera._focus_distance()
+        return sensor | {"type": "thinlens", "aperture_radius": camera.aperture, "focus_distance": focus}
+    if isinstance(camera, PinholeCamera):
+        # From the principal point to the middle, in widths and heights of the film.
+        sensor["principal_point_offset_x"] = 0.5 - camera.cx / camera.width
+        sensor["principal_point_offset_y"] = 0.5 - camera.cy / camera.height
+    return sensor

@@ -84,7 +84,7 @@ class Film:
 
 def can_judge(scene: Scene) -> str | None:
     """Why Mitsuba's film cannot give Whitted's picture of ``scene``; None if it can."""
-    if not isinstance(scene.camera, PerspectiveCamera):
+    if scene.camera.type != "perspective":
         return "a camera that is not perspective"
     if any(scene.ambient):
         return "ambient light"

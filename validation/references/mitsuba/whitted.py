@@ -170,6 +170,8 @@ def recursion_of(
 
 def can_judge(scene: Scene) -> str | None:
     """Why Mitsuba cannot hold ``scene``, so that neither reference can judge it; None if it can."""
+    if scene.camera.type in ("fisheye", "opencv_fisheye"):
+        return "a fish-eye, which has no rays outside its circle"
     try:
         mitsuba_scene.meshes(scene, [mitsuba_scene.diffuse((0.0, 0.0, 0.0))] * len(scene.instances))
     except ValueError as error:
