@@ -6,20 +6,19 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from renderer.errors import expect
 from renderer.lazy import lazy
 from renderer.mesh.mesh import Mesh, face_normals
 from renderer.mesh.values import Owner, interpolated
 from renderer.rayscene.built import BuiltScene, Located
+from renderer.results.attributes import PlacesOnFaces, Values
 from renderer.results.closest_points import ClosestPoints
 from renderer.results.hits import AllHits, Hits, Passage
 
-Values = ArrayLike | Mapping[int, ArrayLike]
 
-
-class _Places:
+class _Places(PlacesOnFaces):
     """Places on faces of a scene, ``(...)`` or ``(m,)``."""
 
     def __init__(self, found: Hits | AllHits | ClosestPoints, scene: BuiltScene) -> None:
@@ -61,7 +60,7 @@ class _Places:
         return self._at.instance
 
     @property
-    def face(self) -> NDArray[np.int64]:
+    def face(self) -> NDArray[np.int64]:  # type: ignore[override]  # computed when it is read
         """The faces of the objects' meshes, (...) int64; -1 on a miss.
 
         Examples
@@ -193,66 +192,10 @@ class _Places:
             found[own] = at
         return np.full(self.face.shape, np.nan) if found is None else found
 
-    def take(self, values: Values) -> NDArray[np.float64]:
-        """Return values of the faces that were hit, as ``interpolate`` with ``on="faces"``.
-
-        Parameters
-        ----------
-        values : array_like, or dict of int to array_like
-            A row for each face of each object.
-
-        Returns
-        -------
-        ndarray of float64, shape (..., ...)
-            nan on a miss.
-
-        Examples
-        --------
-        >>> from renderer import RayScene
-        >>> from renderer.mesh.shapes import box
-        >>> scene = RayScene()
-        >>> cube = scene.add(box())
-        >>> scene.closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1]).take(range(12))
-        array([10., nan])
-        """
-        return self.interpolate(values, on="faces")
-
-    @property
-    def colors(self) -> NDArray[np.float64]:
-        """The vertex colours at the hits, (..., 3) float64; nan on a miss, and on meshes without colours.
-
-        Examples
-        --------
-        >>> from renderer import RayScene
-        >>> from renderer.mesh.shapes import box
-        >>> scene = RayScene()
-        >>> cube = scene.add(box())
-        >>> scene.closest_hit([0.5, 0.25, 3], [0, 0, -1]).colors
-        array([nan, nan, nan])
-        """
-        return self._attribute(lambda mesh: mesh.colors, 3)
-
-    @property
-    def texcoords(self) -> NDArray[np.float64]:
-        """The texture coordinates at the hits, (..., 2) float64; nan on a miss, and on meshes without them.
-
-        Examples
-        --------
-        >>> from renderer import RayScene
-        >>> from renderer.mesh.shapes import box
-        >>> scene = RayScene()
-        >>> cube = scene.add(box())
-        >>> scene.closest_hit([0.5, 0.25, 3], [0, 0, -1]).texcoords
-        array([nan, nan])
-        """
-        return self._attribute(lambda mesh: mesh.texcoords, 2)
-
-    def _attribute(self, of: Callable[[Mesh], Any], width: int) -> NDArray[np.float64]:
+    def _vertex_values(self, name: str) -> Any:
         meshes = {member.id: member.built.mesh for member in self._scene.members}
-        values = {id_: of(mesh) for id_, mesh in meshes.items() if of(mesh) is not None}
-        if not values:
-            return np.full((*self.face.shape, width), np.nan)
-        return self.interpolate(values, on="vertices")
+        values = {id_: getattr(mesh, name) for id_, mesh in meshes.items()}
+        return {id_: own for id_, own in values.items() if own is not None} or None
 
 
 def _by_object(values: Values, meshes: dict[int, Mesh]) -> dict[int, Any]:
