@@ -336,6 +336,13 @@ class BuiltScene:
         corners_of_faces(self.top.descriptor, np.ascontiguousarray(faces), corners)
         return corners
 
+    def mesh_of(self, faces: NDArray[np.int64]) -> tuple[Mesh, NDArray[np.int64]]:
+        """Faces of the scene (k,), placed, as a mesh of their own, and their numbers there; -1 for -1."""
+        known, numbers = faces >= 0, np.full(len(faces), -1)
+        corners = self.corners(faces[known])
+        numbers[known] = np.arange(len(corners))
+        return Mesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)), numbers
+
 
 def tree_over(
     members: list[Member], transforms: NDArray[np.float64], flags: NDArray[np.int64], threads: int

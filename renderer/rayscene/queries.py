@@ -13,7 +13,6 @@ from renderer.arguments.types import ArrayLike
 from renderer.distance.closest import closest_point
 from renderer.distance.signed import signed_distance
 from renderer.inside.contains import contains
-from renderer.mesh.mesh import Mesh
 from renderer.rayscene.built import BuiltScene
 from renderer.rayscene.hits import SceneAllHits, SceneClosestPoints, SceneHits
 from renderer.rayscene.starting import Choice, Leaving, rays_of
@@ -401,10 +400,6 @@ class SceneQueries:
 def _add_errors(
     scene: BuiltScene, hits: Hits | AllHits, rays: RayBatch, rows: NDArray[np.int64] | None, threads: int
 ) -> None:
-    """Set ``hits.t_error``, from the faces that were hit as a mesh of their own."""
-    hit = hits.face >= 0
-    corners = scene.corners(hits.face[hit])
-    own = Mesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
-    faces = np.full(len(hits.face), -1)
-    faces[hit] = np.arange(len(corners))
+    """Set ``hits.t_error``."""
+    own, faces = scene.mesh_of(hits.face)
     hits.t_error = errors_of(own, faces, hits.t, rays, rows, 1.0, threads)

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
-from renderer.mesh.mesh import Mesh
 from renderer.rayscene.built import BuiltScene
 from renderer.rayscene.hits import SceneHits, ScenePassage
 from renderer.results.hits import Hits, Passage
@@ -119,12 +118,8 @@ def _seen_of(
 
 def _leave(scene: BuiltScene, rays: RayBatch, left: StartsOn) -> RayBatch:
     """The rays moved off the faces that they leave."""
-    leaves = left.faces >= 0
-    corners = scene.corners(left.faces[leaves])
-    # The faces that rays leave as a mesh of their own; the kernels look up all others in the scene.
-    faces = np.full(len(left.faces), -1)
-    faces[leaves] = np.arange(len(corners))
-    own = Mesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+    # The kernels need the faces that rays leave as a mesh of their own; all others they look up in the scene.
+    own, faces = scene.mesh_of(left.faces)
     moved = offset_origins(rays, left._replace(faces=faces), own, 1.0, scene.threads)
     _rows(moved)[:, FACE] = left.faces
     return moved
