@@ -18,7 +18,7 @@ from renderer.octree import BruteForce, Octree
 from renderer.trace.batch import check_rays
 from renderer.trace.best import NO_FACE, FaceHit, hit_on
 from renderer.trace.intersect import Ray, box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
-from renderer.trace.layout import CHILDREN, NODE_WORDS, Tree
+from renderer.trace.layout import CHILDREN, NODE_WORDS, Tree, root_box
 from renderer.trace.leaf import nearest_carefully
 from renderer.trace.trees import tree_pointers
 from renderer.trace.walk import blocks_of
@@ -64,10 +64,10 @@ def _octants(tree: Tree, nodes: NDArray[np.int64]) -> tuple[Boxes, NDArray[np.in
 
 def _root_box(tree: Tree) -> Boxes:
     """The box around the root's octants as the only row of (1, 6) float64; no row if there are none."""
-    boxes, _ = _octants(tree, np.zeros(min(1, len(tree.nodes)), np.int64))
-    if not len(boxes):
-        return boxes
-    return np.concatenate([boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)])[None]
+    if not len(tree.nodes):
+        return np.empty((0, 6))
+    lower, upper = root_box(tree.nodes)
+    return np.concatenate([lower, upper])[None][: lower[0] <= upper[0]]
 
 
 def visited(octree: Octree | BruteForce, origin: ArrayLike, direction: ArrayLike, t_max: float = np.inf) -> list[Visit]:

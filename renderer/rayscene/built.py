@@ -50,6 +50,7 @@ from renderer.trace.layout import (
     UNUSED,
     Tree,
     cache_aligned,
+    root_box,
 )
 from renderer.tree.build import SPLITS, build_nodes, new_faces
 from renderer.tree.hierarchy import Rule
@@ -92,8 +93,7 @@ class Member:
         row[:TREE_WORDS] = tree.descriptor
         row[VERTICES], row[MESH_FACES] = mesh.vertices.ctypes.data, mesh.faces.ctypes.data
         # Of the faces: a vertex that none of them has may be anywhere.
-        rows = tree.nodes[:CHILDREN].reshape(3, 2, 8).astype(np.float64) if len(mesh.faces) else np.zeros((3, 2, 8))
-        lower, upper = rows[:, 0].min(axis=1), rows[:, 1].max(axis=1)
+        lower, upper = root_box(tree.nodes) if len(mesh.faces) else (np.zeros(3), np.zeros(3))
         numbers = row.view(np.float64)
         numbers[MIDDLE : MIDDLE + 3] = lower / 2 + upper / 2
         # A rounding more, so that the box is around all corners.
@@ -263,8 +263,7 @@ class BuiltScene:
     @lazy
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """A box around all that is shown."""
-        rows = self.top.nodes[:CHILDREN].reshape(3, 2, 8)
-        return rows[:, 0].min(axis=1).astype(np.float64), rows[:, 1].max(axis=1).astype(np.float64)
+        return root_box(self.top.nodes)
 
     @property
     def vertices(self) -> NDArray[np.float64]:

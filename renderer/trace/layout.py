@@ -81,6 +81,12 @@ class Tree:
         return _restored, (self.nodes, self.blocks, self.faces, self.depth, self.scale)
 
 
+def root_box(nodes: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The lower and upper corner, (3,), of the box around the octants of the first node; inf and -inf if it has none."""
+    rows = nodes[:CHILDREN].reshape(3, 2, 8)
+    return rows[:, 0].min(axis=1).astype(np.float64), rows[:, 1].max(axis=1).astype(np.float64)
+
+
 def _restored(nodes: NDArray[Any], blocks: NDArray[Any], faces: NDArray[np.int32], depth: int, scale: float) -> Tree:
     return Tree(_aligned(nodes), _aligned(blocks), faces, depth, scale)
 
