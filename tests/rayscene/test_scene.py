@@ -225,14 +225,10 @@ def test_a_ray_passes_through_the_instance_that_it_ignores(repeats):
     assert first.instance.tolist() == np.repeat([2, 0, -1], repeats).tolist()
     assert second.instance.tolist() == np.repeat([1, 1, -1], repeats).tolist()
     # From the body itself: a ray into it comes out on the other side unhindered.
-    inward = scene.closest_hit(first.points[first.hit], aims[first.hit], leaving=first_of(scene, origins, aims, first))
+    inward = scene.closest_hit(first.points[first.hit], aims[first.hit], leaving=first[first.hit])
     assert (inward.t == 0).all() or inward.hit.all()
-    free = scene.closest_hit(origins[first.hit], aims[first.hit], ignore=first_of(scene, origins, aims, first))
+    free = scene.closest_hit(origins[first.hit], aims[first.hit], ignore=first[first.hit])
     assert (free.instance == 1).all()
-
-
-def first_of(scene, origins, aims, hits):
-    return scene.closest_hit(origins[hits.hit], aims[hits.hit])
 
 
 @cases("repeats", [1, 10])
