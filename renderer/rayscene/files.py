@@ -20,7 +20,7 @@ from renderer.queryable import Built
 from renderer.rayscene.built import BuiltScene, Member, tree_over
 from renderer.rayscene.store import StoredScene
 from renderer.rayscene.transforms import as_transforms, can_be_inverted
-from renderer.trace.instances import MASK_BITS
+from renderer.trace.layout import MASK_BITS
 
 
 class _Object(NamedTuple):

@@ -21,7 +21,7 @@ from renderer.results.steps import Steps
 from renderer.trace.batch import RayBatch
 from renderer.trace.closest import any_hits, closest_hits
 from renderer.trace.error import errors_of
-from renderer.trace.instances import MASK_BITS
+from renderer.trace.layout import MASK_BITS
 from renderer.trace.steps import count_steps
 
 Sides = Literal["both", "front", "back"]

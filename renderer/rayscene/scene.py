@@ -34,7 +34,8 @@ from renderer.rayscene.queries import SceneQueries
 from renderer.rayscene.store import StoredScene, load_scene, save_scene
 from renderer.rayscene.transforms import as_transforms, place_records
 from renderer.system.threads import checked_threads
-from renderer.trace.instances import FLAGS, HIDDEN, MASK_BITS
+from renderer.trace.instances import FLAGS, HIDDEN
+from renderer.trace.layout import MASK_BITS
 
 # What a copy of a scene has of its own.
 _OWN = ("_lock", "_members", "_instances", "_added", "_count", "_faces", "_next", "_snapshot", "_listed")

@@ -14,7 +14,8 @@ from renderer.rayscene.hits import SceneHits, ScenePassage
 from renderer.results.hits import Hits, Passage
 from renderer.trace.batch import NO_STARTS, RayBatch, check_rays, offset_origins, whole_numbers
 from renderer.trace.batch import Leaving as StartsOn
-from renderer.trace.instances import FLAGS, MASK_BITS
+from renderer.trace.instances import FLAGS
+from renderer.trace.layout import MASK_BITS
 from renderer.trace.leaving import check_leaving, shapes_of_starts
 from renderer.trace.starts.record import ALL, FACE, HEAD, IGNORED, MASK, ROW, ROW_STEP
 

@@ -19,7 +19,8 @@ from renderer.queryable import Built
 from renderer.rayscene.built import BuiltScene, Member, placement, tree_over
 from renderer.rayscene.transforms import as_transforms
 from renderer.system.files import write_atomically
-from renderer.trace.instances import HIDDEN, MASK_BITS
+from renderer.trace.instances import HIDDEN
+from renderer.trace.layout import MASK_BITS
 from renderer.tree.container import Format, Reader, checked_path, opened, shown, write
 from renderer.tree.store import Stored, read_octree, write_octree
 

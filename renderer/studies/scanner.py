@@ -25,7 +25,7 @@ from renderer.studies.share import ROWS as _ROWS
 from renderer.studies.share import Snapshot, check_directions, check_reach, lengths_of, limits_of, snapshot_of
 from renderer.studies.stand import hits_from_stand
 from renderer.system.terminal import progress_bar
-from renderer.trace.instances import MASK_BITS
+from renderer.trace.layout import MASK_BITS
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
