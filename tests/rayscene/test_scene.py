@@ -366,6 +366,20 @@ def test_inside_and_distance_of_closed_parts_that_overlap():
     assert (scene.count_steps([[1, 1, 9]], [0, 0, -1]).nodes > 0).all()
 
 
+@cases("factors", [[1, 1, 2.0**119], [2.0**-119] * 3, [1.0, 2.0**-119, 1.0]])
+def test_factors_that_float32_holds_have_the_bits_of_the_merged_mesh_and_others_are_refused(factors):
+    """Boxes were NaN beyond it, and small ones were passed: queries missed what is there."""
+    flat, scene = Mesh(box().vertices[:4] * [1, 1, 0], [[0, 1, 2], [1, 3, 2], [0, 2, 1]]), RayScene()
+    places = np.zeros((20, 3, 4))
+    places[:, :, :3], places[:, :, 3] = np.diag(factors), np.random.default_rng(4).uniform(-4, 4, (20, 3))
+    places[:, :, 3] *= np.minimum(factors, 1)
+    scene.add(flat, places)
+    assert_like_merged(scene, 1)
+    places[7, :, :3] = np.diag(np.square(factors))
+    with pytest.raises(ValueError, match=r"transforms: .* factors of the mesh's lengths from .* for instance 7"):
+        scene.move(0, places)
+
+
 def crushed():
     turned = rotation(np.random.default_rng(3))
     return np.column_stack([turned @ np.diag([1.0, 1.0, 1e-14]) @ turned.T, np.zeros(3)])

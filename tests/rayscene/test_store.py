@@ -80,7 +80,7 @@ def state(scene: RayScene) -> tuple[Any, ...]:
 def changed(scene: RayScene) -> RayScene:
     """The scene after each kind of change."""
     first = scene.objects[0]
-    scene.move(first, transforms(1, 7), instances=[1])
+    scene.move(first, scene.transforms(first)[:1] * 0.75, instances=[1])
     scene.refit(first, scene.mesh(first).vertices * [1, 0.5, 2])
     scene.show(first, False)
     scene.show(first, True)
