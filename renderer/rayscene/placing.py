@@ -57,7 +57,8 @@ def place(matrices, instances, words, begin, end):
     """Write matrix, inverse, place, room and the flag of mirrors of the instances begin:end, whose objects are written.
 
     ``matrices`` (k, 3, 4) float64; ``instances`` (k, INSTANCE_WORDS) float64 and ``words`` are the same memory. Returns
-    the first one whose matrix is singular or nearly so, or whose coordinates or factors are too large or too small, or -1.
+    the first one whose matrix is singular or nearly so, whose coordinates are too large, or whose factors are too large
+    or too small; or -1.
     """
     for i in range(begin, end):
         record, flags = offset(pointer(instances), i * INSTANCE_WORDS), offset(pointer(words), i * INSTANCE_WORDS)

@@ -96,7 +96,8 @@ _SHARED = 24
 
 # The rows of lanes that meshes do not use.
 _INSTANCE, _NODES_AT, _BLOCKS_AT, _MASK, _IGNORED = (row * WIDTH for row in range(11, 16))
-# What the roundings of a placed box may cost: eight of float32, as a share of all that is added, and of its least number.
+# What the roundings of a placed box may cost, eight of float32: as a share of all that is added, and of its least
+# number.
 _BOX_ROOM, _TINY = np.float32(2.0**-20), np.float32(2.0**-146)
 
 
