@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
-from threading import RLock
 from typing import Any
 from uuid import uuid4
 
@@ -30,6 +29,7 @@ from renderer.rayscene.built import (
     new_records,
 )
 from renderer.rayscene.files import scene_of_files
+from renderer.rayscene.locking import new_lock
 from renderer.rayscene.queries import SceneQueries
 from renderer.rayscene.store import StoredScene, load_scene, save_scene
 from renderer.rayscene.transforms import as_transforms, place_records
@@ -67,7 +67,7 @@ class RayScene(SceneQueries):
 
     def __init__(self, *, threads: int | None = None) -> None:
         self.threads = checked_threads(threads)
-        self._lock = RLock()
+        self._lock = new_lock()
         self._members: dict[int, Member] = {}
         # The records of instances, and of those that were added since.
         self._instances, self._added = new_records(0), list[NDArray[np.float64]]()
@@ -623,7 +623,7 @@ class RayScene(SceneQueries):
         return {**kept, "stored": stored}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self._lock = RLock()
+        self._lock = new_lock()
         self._keep(state.pop("stored"))
         vars(self).update(state)
 
