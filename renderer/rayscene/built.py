@@ -57,6 +57,8 @@ from renderer.tree.hierarchy import Rule
 
 # The faces of a scene are numbered by int32, and the largest number means none.
 MOST_FACES = np.iinfo(np.int32).max - 1
+# So many that a block of the last one, times BLOCK_WORDS, is an int64.
+MOST_INSTANCES = (1 << 63 - NUMBER_BITS) // BLOCK_WORDS - 1
 # The sides of faces that rays may hit, as ``trace.instances`` numbers them.
 SIDES = ("both", "front", "back")
 # A block and the place in it share a number with the instance.
@@ -350,13 +352,13 @@ def tree_over(
 
     Raises ``ValueError`` for what cannot be placed.
     """
+    listed = Members(members)
+    check_sizes(len(transforms), listed.faces)
     instances = new_records(len(transforms))
     instances.view(np.int64)[:, FLAGS] = flags
     for m in members:
         own = np.s_[m.begin : m.begin + m.count]
         place_records(m.row, instances[own], transforms[own])
-    listed = Members(members)
-    check_sizes(listed.faces)
     listed.number(instances)
     return SceneTree(listed, instances, threads)
 
@@ -376,8 +378,9 @@ def matrices_of(member: Member, instances: NDArray[np.float64]) -> NDArray[np.fl
     return own
 
 
-def check_sizes(faces: int) -> None:
-    """Raise ``ValueError`` for more faces than a scene can number."""
+def check_sizes(instances: int, faces: int) -> None:
+    """Raise ``ValueError`` for more instances or faces than a scene can number."""
+    expect(instances <= MOST_INSTANCES, "scene", f"at most {MOST_INSTANCES:,} instances", f"{instances:,}")
     expect(faces <= MOST_FACES, "scene", f"at most {MOST_FACES:,} faces, copies counted", f"{faces:,}")
 
 

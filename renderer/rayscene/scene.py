@@ -165,7 +165,8 @@ class RayScene(SceneQueries):
         expect(isinstance(scene, RayScene), "scene", "a RayScene", type(scene).__name__)
         outer, there = as_transforms(transforms), scene._built
         with self._lock:
-            check_sizes(self._faces + len(outer) * there.count)
+            copies = len(outer)
+            check_sizes(self._count + copies * len(there.top.instances), self._faces + copies * there.count)
             made = {m.id: _composed(outer, there.matrices(m)) for m in there.members}
             for m in there.members:
                 place_records(m.row, new_records(len(made[m.id])), made[m.id])  # refused before any is added
@@ -185,7 +186,7 @@ class RayScene(SceneQueries):
         check_mesh(built.tree)
         with self._lock:
             faces = self._faces + len(matrices) * len(built.mesh.faces)
-            check_sizes(faces)
+            check_sizes(self._count + len(matrices), faces)
             member = Member(self._next, name, built, self._count, len(matrices), names)
             own = new_records(len(matrices))
             own.view(np.int64)[:, FLAGS] = flags

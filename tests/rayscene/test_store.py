@@ -170,6 +170,20 @@ def test_a_map_is_viewed_and_not_copied(path: Path) -> None:
     assert len(owners) == 1
 
 
+def test_more_instances_than_a_scene_can_number_are_refused(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The products that say where their blocks are left int64."""
+    scene, more, message = RayScene(), RayScene(), r"scene: expected at most 5 instances, got 6"
+    scene.add(box(), transforms(3))
+    scene.save(path)
+    monkeypatch.setattr("renderer.rayscene.built.MOST_INSTANCES", 5)
+    for add in (lambda: scene.add(box(), transforms(3)), lambda: scene.add_scene(scene, transforms(1))):
+        with pytest.raises(ValueError, match=message):
+            add()
+    more.add(box(), transforms(5))
+    monkeypatch.setattr("renderer.rayscene.built.MOST_INSTANCES", 2)
+    assert refusal(path).startswith("scene: expected at most 2 instances, got 3")
+
+
 # --- files that are none ----------------------------------------------------------------------------------------
 
 
