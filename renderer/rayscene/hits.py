@@ -21,8 +21,15 @@ from renderer.results.hits import AllHits, Hits, Passage
 class _Places(PlacesOnFaces):
     """Places on faces of a scene, ``(...)`` or ``(m,)``."""
 
+    # The arrays that ``repr`` shows first, as that of an octree's hits does.
+    _own: tuple[str, ...] = ("t", "side", "t_error")
+
     def __init__(self, found: Hits | AllHits | ClosestPoints, scene: BuiltScene) -> None:
         self._found, self._scene = found, scene
+
+    def __repr__(self) -> str:
+        names = (*self._own, "object", "instance", "face", "u", "v")
+        return f"{type(self).__name__}({', '.join(f'{name}={getattr(self, name)!r}' for name in names)})"
 
     @lazy
     def _at(self) -> Located:
@@ -343,6 +350,7 @@ class SceneAllHits(_Places):
     """
 
     _found: AllHits
+    _own = ("offsets", "t", "side", "t_error")
 
     def __init__(self, hits: AllHits, scene: BuiltScene) -> None:
         super().__init__(hits, scene)
@@ -397,6 +405,8 @@ class SceneClosestPoints(_Places):
     >>> near.distance, near.object
     (array([ 2., inf]), array([ 0, -1]))
     """
+
+    _own = ("distance",)
 
     def __init__(self, near: ClosestPoints, scene: BuiltScene) -> None:
         super().__init__(near, scene)
