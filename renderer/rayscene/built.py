@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from renderer.errors import expect, expect_known
 from renderer.lazy import lazy
+from renderer.mesh.mending import enclosed_share
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.queryable import Built
@@ -63,6 +64,8 @@ MOST_INSTANCES = (1 << 63 - NUMBER_BITS) // BLOCK_WORDS - 1
 SIDES = ("both", "front", "back")
 # A block and the place in it share a number with the instance.
 _MOST_BLOCKS = (1 << NUMBER_BITS) // BLOCK_WORDS
+# The share of its box that a mesh encloses for certain, whatever is rounded.
+_ENCLOSED = 1e-6
 # Faces that are looked for together: a tenth of a millisecond.
 _CHUNK = 4096
 _RULE = Rule(SPLITS["midpoint"], 1, 32)
@@ -102,19 +105,25 @@ class Member:
         numbers[HALF : HALF + 3] = np.where(upper > lower, np.nextafter((upper - lower) / 2, np.inf), 0.0)
         return row
 
+    @lazy
+    def encloses(self) -> bool:
+        """Whether the mesh is closed and, as its faces are turned, encloses more than nothing; so do copies then."""
+        mesh = self.built.mesh
+        return mesh.is_closed() and enclosed_share(mesh.bounds, mesh.triangles) > _ENCLOSED
+
 
 class Members:
     """The members of a scene in order, and what a tree over their instances needs of them.
 
     table  (m + 1, 2) int64, the first instance and the number of each, and the number of instances last
-    filled (n,) bool, whether each instance has faces
+    sizes  (n,) int64, the number of faces of each instance
     """
 
     def __init__(self, members: Iterable[Member]) -> None:
         self.listed = list(members)
         counts = np.array([m.count for m in self.listed], np.int64)
         faces = np.array([len(m.built.mesh.faces) for m in self.listed], np.int64)
-        self.faces, self.filled = int((counts * faces).sum()), np.repeat(faces > 0, counts)
+        self.faces, self.sizes = int((counts * faces).sum()), np.repeat(faces, counts)
         self.table = np.array([(m.begin, m.id) for m in self.listed] + [(int(counts.sum()), -1)], np.int64)
         self.depth = max((m.built.tree.depth for m in self.listed), default=0)
 
@@ -139,8 +148,8 @@ class SceneTree:
 
     def __init__(self, members: Members, instances: NDArray[np.float64], threads: int) -> None:
         words = instances.view(np.int64)
-        shown = np.flatnonzero((words[:, FLAGS] & HIDDEN == 0) & members.filled)
-        self.members, self.instances, self.is_empty = members, instances, not len(shown)
+        shown = np.flatnonzero((words[:, FLAGS] & HIDDEN == 0) & (members.sizes > 0))
+        self.members, self.instances, self.faces_shown = members, instances, int(members.sizes[shown].sum())
         self.nodes, levels = _top(instances, words, shown, threads)
         self.depth = levels + members.depth + 1
 
@@ -235,7 +244,7 @@ class BuiltScene:
 
     @lazy
     def _alone(self) -> Tree | None:
-        if len(self.top.instances) != 1 or self.top.is_empty:
+        if len(self.top.instances) != 1 or not self.top.faces_shown:
             return None
         plain = self.top.instances.view(np.int64)[0, FLAGS] == MASK_BITS
         only = next(m for m in self.members if m.count)
@@ -259,8 +268,8 @@ class BuiltScene:
 
     @property
     def faces(self) -> range:
-        """The numbers of the faces of all instances; none if nothing is shown."""
-        return range(0 if self.top.is_empty else self.count)
+        """As many as faces are shown; ``count`` numbers them all."""
+        return range(self.top.faces_shown)
 
     @lazy
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -293,8 +302,8 @@ class BuiltScene:
         return edges
 
     def is_closed(self) -> bool:
-        """``Mesh.is_closed`` of the merged mesh, which is closed if all placed meshes are."""
-        return all(m.built.mesh.is_closed() for m in self.members) or self.merged.mesh.is_closed()
+        """``Mesh.is_closed`` of the merged mesh: closed meshes are closed together, unless they cancel."""
+        return all(m.encloses for m in self.members) or self.merged.mesh.is_closed()
 
     @lazy
     def merged(self) -> Octree:
