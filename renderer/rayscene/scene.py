@@ -10,9 +10,9 @@ from uuid import uuid4
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.arguments.arrays import flag_argument, real_argument
+from renderer.arguments.arrays import flag_argument, plain_argument, real_argument
 from renderer.arguments.types import ArrayLike
-from renderer.errors import expect
+from renderer.errors import MeshError, expect
 from renderer.mesh.foreign import TriangleMesh
 from renderer.mesh.load import FilePaths
 from renderer.mesh.mesh import Mesh
@@ -205,8 +205,8 @@ class RayScene(SceneQueries):
         object : int
         transforms : array_like, shape (3, 4), (4, 4), (k, 3, 4) or (k, 4, 4)
             As for ``add``, one for each instance that is moved.
-        instances : array_like of int, shape (k,), optional
-            Which instances; None for all.
+        instances : array_like of int or bool, optional
+            Which k instances: their numbers, or a bool for each of the object; None for all.
 
         Raises
         ------
@@ -223,6 +223,7 @@ class RayScene(SceneQueries):
         >>> scene.closest_hit([0.5, 0.25, 9], [0, 0, -1]).t
         array(3.)
         """
+        expect(transforms is not None, "transforms", "matrices", "None")
         matrices = as_transforms(transforms)
         with self._lock:
             member = self._member(object)
@@ -243,7 +244,7 @@ class RayScene(SceneQueries):
         Raises
         ------
         MeshError
-            For other arrays; nothing is changed then.
+            For other arrays, or vertices that the instances place too far away; nothing is changed then.
 
         Examples
         --------
@@ -262,7 +263,10 @@ class RayScene(SceneQueries):
             octree.refit(vertices)
             refitted = replace(member, built=octree._built)
             own = self._records[member.begin : member.begin + member.count].copy()
-            place_records(refitted.row, own, matrices_of(member, self._records))
+            try:
+                place_records(refitted.row, own, matrices_of(member, self._records))
+            except ValueError as error:
+                raise MeshError(f"vertices: expected positions that every instance can place; {error}") from None
             self._writable()[member.begin : member.begin + member.count] = own
             self._members[object], self._listed = refitted, None
 
@@ -273,8 +277,8 @@ class RayScene(SceneQueries):
         ----------
         object : int
         shown : array_like of bool, shape () or (k,), default True
-        instances : array_like of int, shape (k,), optional
-            Which instances; None for all.
+        instances : array_like of int or bool, optional
+            Which k instances: their numbers, or a bool for each of the object; None for all.
 
         Raises
         ------
@@ -293,7 +297,7 @@ class RayScene(SceneQueries):
         """
         with self._lock:
             rows = self._rows_of(object, instances)
-            given = np.asarray(shown)
+            given = plain_argument("shown", shown)
             fits = given.dtype == np.bool_ and given.shape in ((), (len(rows),))
             expect(fits, "shown", f"a bool or {len(rows)} bools", f"{given.dtype} of shape {given.shape}")
             flags = self._writable().view(np.int64)[:, FLAGS]
@@ -322,8 +326,8 @@ class RayScene(SceneQueries):
         object : int
         mask : array_like of int, shape () or (k,)
             32 bits, as for ``add``.
-        instances : array_like of int, shape (k,), optional
-            Which instances; None for all.
+        instances : array_like of int or bool, optional
+            Which k instances: their numbers, or a bool for each of the object; None for all.
 
         Raises
         ------
@@ -696,9 +700,11 @@ def _masks(mask: ArrayLike, count: int) -> NDArray[np.int64]:
 def _rows(instances: ArrayLike | None, count: int) -> NDArray[np.int64]:
     if instances is None:
         return np.arange(count)
-    rows = real_argument("instances", instances).reshape(-1)
-    if rows.dtype == np.bool_ and len(rows) == count:
-        rows = np.flatnonzero(rows)
+    rows = plain_argument("instances", instances)
+    if rows.dtype == np.bool_:
+        expect(rows.shape == (count,), "instances", f"{count} bools, or integers", f"bools of shape {rows.shape}")
+        return np.flatnonzero(rows)
+    rows = real_argument("instances", rows).reshape(-1)
     rows = rows if len(rows) else rows.astype(np.int64)
     fits = rows.dtype.kind in "iu" and ((rows >= 0) & (rows < count)).all() and len(np.unique(rows)) == len(rows)
     expect(bool(fits), "instances", f"different integers from 0 to {count - 1}", rows.tolist()[:10])

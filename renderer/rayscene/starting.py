@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.arguments.arrays import real_argument
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.rayscene.built import BuiltScene
@@ -39,7 +40,7 @@ def rays_of(
     expect(plain, "faces", "'both' with leaving", repr(choice.faces))
     leaving, ignored = _on_faces(scene, choice.leaving), _ignored(scene, choice.ignore)
     shapes = shapes_of_starts(leaving, None) if leaving is not None else {}
-    mask = np.asarray(choice.mask)
+    mask = real_argument("mask", choice.mask)
     shapes |= {"mask": mask.shape, **({} if ignored is None else {"ignore": ignored.shape})}
     rays, shape = check_rays(origins, directions, t_min, t_max, shapes)
     count, masks = rays.number, _masks(mask, shape)

@@ -380,6 +380,31 @@ def test_factors_that_float32_holds_have_the_bits_of_the_merged_mesh_and_others_
         scene.move(0, places)
 
 
+@cases(
+    ("meshes", "inside"),
+    [
+        ([box(), Mesh(box().vertices, box().faces[:, ::-1])], None),
+        ([box(), Mesh(box().vertices * 2, box().faces[:, ::-1])], False),
+        ([Mesh(box().vertices, box().faces[:, ::-1])], True),
+        ([box(), Mesh(np.empty((0, 3)), np.empty((0, 3), int))], True),
+    ],
+)
+def test_closed_parts_have_an_inside_unless_they_cancel(meshes, inside):
+    """As of the merged mesh, which counts only what is shown."""
+    scene = RayScene()
+    for mesh in meshes:
+        scene.add(mesh)
+    scene.show(scene.add(box()), False)
+    merged, point = Octree(scene.merged), [0.25, 0.25, 0.25]
+    if inside is None:
+        for query in (merged.contains, scene.contains, scene.signed_distance):
+            with pytest.raises(ValueError, match="got 24 faces, each as often one way round as the other"):
+                query(point)
+    else:
+        assert scene.contains(point) == merged.contains(point) == inside
+        assert scene.signed_distance(point) == merged.signed_distance(point)
+
+
 def crushed():
     turned = rotation(np.random.default_rng(3))
     return np.column_stack([turned @ np.diag([1.0, 1.0, 1e-14]) @ turned.T, np.zeros(3)])
@@ -427,6 +452,11 @@ FAULTS = {
     "faces: expected 'both' with leaving": lambda s: s.any_hit(
         HERE, DOWN, leaving=s.closest_hit(HERE, DOWN), faces="front"
     ),
+    "instances: expected 1 bools, or integers, got bools of shape .2,.": lambda s: s.show(0, instances=[True, False]),
+    "shown: expected an array, got rows of different lengths": lambda s: s.show(0, [[True], [True, False]]),
+    "mask: expected an array, got rows of different lengths": lambda s: s.any_hit(HERE, DOWN, mask=[[1], [1, 2]]),
+    "transforms: expected matrices, got None": lambda s: s.move(0, None),
+    "vertices: expected positions that every instance can place": lambda s: s.refit(0, box().vertices * 1e30),
     "values: expected objects of the scene": lambda s: s.closest_hit(HERE, DOWN).interpolate({5: range(12)}),
 }
 
@@ -447,6 +477,26 @@ def test_values_of_one_object_are_not_taken_for_those_of_others():
     scene.add(box())
     with pytest.raises(ValueError, match="values: expected a dict of object"):
         scene.closest_hit(HERE, DOWN).take(range(12))
+
+
+def test_instances_are_chosen_by_number_or_by_a_bool_for_each():
+    scene, lifted = RayScene(), np.eye(4) + np.outer([0, 0, 1, 0], [0, 0, 0, 5])
+    scene.add(box(), [np.eye(4)] * 3)
+    scene.move(0, [lifted, lifted], instances=np.array([True, False, True]))
+    assert scene.transforms(0)[:, 2, 3].tolist() == [5, 0, 5]
+    scene.show(0, False, instances=[False, True, False])
+    assert scene.shown(0).tolist() == [True, False, True]
+
+
+def test_hits_print_as_what_they_are():
+    """Not as an object at an address."""
+    scene = another()
+    assert repr(scene.closest_hit(HERE, DOWN)) == (
+        "SceneHits(t=array(8.), side=array(1), t_error=None, object=array(0), instance=array(0), face=array(10), "
+        "u=array(0.25), v=array(0.25))"
+    )
+    assert repr(scene.all_hits(HERE, DOWN)).startswith("SceneAllHits(offsets=array([0, 2]), t=array([8., 9.]), ")
+    assert repr(scene.closest_point(HERE)).startswith("SceneClosestPoints(distance=array(8.), object=array(0), ")
 
 
 def test_a_mesh_that_cannot_be_used_is_refused():
