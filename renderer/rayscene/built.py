@@ -10,6 +10,7 @@ from uuid import uuid4
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.distance.closest import Counted
 from renderer.errors import expect, expect_known
 from renderer.lazy import lazy
 from renderer.mesh.mending import enclosed_share
@@ -345,6 +346,17 @@ class BuiltScene:
         corners = np.empty((len(faces), 3, 3))
         corners_of_faces(self.top.descriptor, np.ascontiguousarray(faces), corners)
         return corners
+
+    def counted(self, mask: int | None) -> Counted:
+        """What is shown and, with a mask, has a bit of it, as ``closest_point`` takes it."""
+
+        def faces() -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+            flags = self.top.instances.view(np.int64)[:, FLAGS]
+            chosen = (flags & HIDDEN == 0) & (mask is None or flags & mask != 0)
+            numbers = np.flatnonzero(np.repeat(chosen, self.members.sizes))
+            return numbers, self.corners(numbers)
+
+        return Counted(-1 if mask is None else mask, faces)
 
     def mesh_of(self, faces: NDArray[np.int64]) -> tuple[Mesh, NDArray[np.int64]]:
         """Faces of the scene (k,), placed, as a mesh of their own, and their numbers there; -1 for -1."""

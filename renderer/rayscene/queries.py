@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from renderer.all_hits.all_hits import all_hits, count_hits
 from renderer.arguments.arrays import flag_argument
+from renderer.arguments.counts import count_argument
 from renderer.arguments.types import ArrayLike
 from renderer.distance.closest import closest_point
 from renderer.distance.signed import signed_distance
@@ -310,7 +311,9 @@ class SceneQueries:
         """
         return self._built.merged.winding_number(points, tolerance)
 
-    def closest_point(self, points: ArrayLike, max_distance: ArrayLike = np.inf) -> SceneClosestPoints:
+    def closest_point(
+        self, points: ArrayLike, max_distance: ArrayLike = np.inf, *, mask: int | None = None
+    ) -> SceneClosestPoints:
         """Return the nearest point of the surfaces to each point, as ``Octree.closest_point``.
 
         Of equal distances, the lowest object is named, then the lowest instance, then the lowest face.
@@ -319,6 +322,8 @@ class SceneQueries:
         ----------
         points, max_distance
             As for ``Octree.closest_point``.
+        mask : int, optional
+            32 bits: instances count whose mask has one of them too; None for all instances.
 
         Returns
         -------
@@ -335,7 +340,9 @@ class SceneQueries:
         (array(1.), array(1))
         """
         built = self._built
-        return SceneClosestPoints(closest_point(built.tree, built.mesh, points, max_distance, self.threads), built)
+        counted = built.counted(None if mask is None else count_argument("mask", mask, 0, MASK_BITS, " or None"))
+        found = closest_point(built.tree, built.mesh, points, max_distance, self.threads, counted)
+        return SceneClosestPoints(found, built)
 
     def signed_distance(
         self,

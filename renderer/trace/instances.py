@@ -127,9 +127,9 @@ class ScenePointers(NamedTuple):
 
 
 @inlined
-def _may_hit(tree, block, mask, ignored):
-    number = block >> NUMBER_BITS
-    return _meets(_instance(tree, number)[1], number, mask, ignored)
+def _may_hit(tree, place, mask, ignored):
+    number = place >> NUMBER_BITS
+    return number == 0 or _meets(_instance(tree, number)[1], number, mask, ignored)
 
 
 @inlined

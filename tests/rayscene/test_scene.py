@@ -405,6 +405,26 @@ def test_closed_parts_have_an_inside_unless_they_cancel(meshes, inside):
         assert scene.signed_distance(point) == merged.signed_distance(point)
 
 
+@cases("mask", [None, 1, 2, 6, 8])
+def test_the_nearest_point_is_that_of_what_a_mask_chooses(mask):
+    """As of a scene of those alone, from many points, and from one whose products float64 loses."""
+    rng, scene, alone, masks = np.random.default_rng(9), RayScene(), RayScene(), np.arange(12) % 4
+    places = np.concatenate([placed(rng, "turned", 8), np.tile(np.eye(4)[:3], (4, 1, 1))])
+    scene.add(box(), places, mask=masks)
+    scene.show(0, False, instances=[0, 5])
+    chosen = np.flatnonzero([scene.shown(0)[k] and (mask is None or masks[k] & mask) for k in range(12)])
+    alone.add(box(), places[chosen])
+    for points in (rng.normal(size=(2000, 3)) * 3, [[0.5, 0.25, 1e-300]]):
+        ours = scene.closest_point(points, mask=mask)
+        if not len(chosen):
+            assert (ours.distance == np.inf).all() and (ours.object == -1).all() and np.isnan(ours.u).all()
+            continue
+        theirs = alone.closest_point(points)
+        np.testing.assert_array_equal(ours.distance, theirs.distance)
+        np.testing.assert_array_equal(ours.instance, chosen[theirs.instance])
+        np.testing.assert_array_equal(ours.face, theirs.face)
+
+
 def crushed():
     turned = rotation(np.random.default_rng(3))
     return np.column_stack([turned @ np.diag([1.0, 1.0, 1e-14]) @ turned.T, np.zeros(3)])
@@ -455,6 +475,7 @@ FAULTS = {
     "instances: expected 1 bools, or integers, got bools of shape .2,.": lambda s: s.show(0, instances=[True, False]),
     "shown: expected an array, got rows of different lengths": lambda s: s.show(0, [[True], [True, False]]),
     "mask: expected an array, got rows of different lengths": lambda s: s.any_hit(HERE, DOWN, mask=[[1], [1, 2]]),
+    "mask: expected an integer from 0 to 4294967295 or None, got .1.": lambda s: s.closest_point(HERE, mask=[1]),
     "transforms: expected matrices, got None": lambda s: s.move(0, None),
     "vertices: expected positions that every instance can place": lambda s: s.refit(0, box().vertices * 1e30),
     "values: expected objects of the scene": lambda s: s.closest_hit(HERE, DOWN).interpolate({5: range(12)}),
