@@ -176,7 +176,6 @@ def _reaches(query, k, found):
 
 @inlined
 def _enter(tree, query, node, found, top):
-    # rule: mask-of-point
     if query.mask >= 0 and not tree.ways.may_hit(tree, node, query.mask, -1):
         return found, top
     nodes, base = boxes_of(tree, node)

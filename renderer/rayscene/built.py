@@ -78,18 +78,17 @@ def _new_id() -> str:
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """A mesh of a scene with its tree, and where its instances are among all; ``names`` are theirs, if any."""
+    """A mesh of a scene with its tree, and the number of its instances; ``names`` are theirs, if any."""
 
     id: int
     name: str
     built: Built
-    begin: int
     count: int
     names: tuple[str, ...] = ()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copy and pickle without the addresses."""
-        return Member, (self.id, self.name, self.built, self.begin, self.count, self.names)
+        return Member, (self.id, self.name, self.built, self.count, self.names)
 
     @lazy
     def row(self) -> NDArray[np.int64]:
@@ -125,17 +124,24 @@ class Members:
         counts = np.array([m.count for m in self.listed], np.int64)
         faces = np.array([len(m.built.mesh.faces) for m in self.listed], np.int64)
         self.faces, self.sizes = int((counts * faces).sum()), np.repeat(faces, counts)
-        self.table = np.array([(m.begin, m.id) for m in self.listed] + [(int(counts.sum()), -1)], np.int64)
+        begins, ids = np.concatenate([[0], counts.cumsum()]), [m.id for m in self.listed]
+        self.table = np.stack([begins, np.array([*ids, -1])], axis=1)
+        self._begins = dict(zip(ids, begins.tolist(), strict=False))
         self.depth = max((m.built.tree.depth for m in self.listed), default=0)
 
     def __iter__(self) -> Iterator[Member]:
         return iter(self.listed)
 
+    def rows(self, member: Member) -> slice:
+        """Where a member's instances are among all."""
+        begin = self._begins[member.id]
+        return slice(begin, begin + member.count)
+
     def number(self, instances: NDArray[np.float64]) -> None:
         """Write the number of the first face of each instance, and the address of its object."""
         words, first = instances.view(np.int64), 0
         for m in self:
-            own = words[m.begin : m.begin + m.count]
+            own = words[self.rows(m)]
             faces = len(m.built.mesh.faces)
             own[:, OBJECT] = m.row.ctypes.data
             own[:, FIRST_FACE] = first + faces * np.arange(m.count)
@@ -259,8 +265,7 @@ class BuiltScene:
 
     def flags(self, member: Member) -> NDArray[np.int64]:
         """The masks of a member's instances, with HIDDEN of those that are not shown."""
-        own = self.top.instances.view(np.int64)[member.begin : member.begin + member.count, FLAGS]
-        return own & (MASK_BITS | HIDDEN)
+        return self.top.instances.view(np.int64)[self.members.rows(member), FLAGS] & (MASK_BITS | HIDDEN)
 
     @property
     def mesh(self) -> Any:
@@ -313,15 +318,14 @@ class BuiltScene:
 
     def _placed(self) -> Iterator[Mesh]:
         """The mesh of each instance that is shown."""
-        flags = self.top.instances.view(np.int64)[:, FLAGS]
         for m in self.members:
-            for matrix, flag in zip(self.matrices(m), flags[m.begin :], strict=False):
+            for matrix, flag in zip(self.matrices(m), self.flags(m), strict=True):
                 if flag & HIDDEN == 0:
                     yield m.built.mesh.transformed(np.concatenate([matrix, [[0.0, 0.0, 0.0, 1.0]]]))
 
     def matrices(self, member: Member) -> NDArray[np.float64]:
         """The transforms of a member's instances, (k, 3, 4)."""
-        return matrices_of(member, self.top.instances)
+        return matrices_of(member, self.top.instances[self.members.rows(member)])
 
     def located(self, faces: NDArray[np.int64], u: NDArray[np.float64], v: NDArray[np.float64]) -> Located:
         """Where faces of the scene (...) and places on them are; -1 for -1."""
@@ -378,23 +382,21 @@ def tree_over(
     instances = new_records(len(transforms))
     instances.view(np.int64)[:, FLAGS] = flags
     for m in members:
-        own = np.s_[m.begin : m.begin + m.count]
+        own = listed.rows(m)
         place_records(m.row, instances[own], transforms[own])
     listed.number(instances)
     return SceneTree(listed, instances, threads)
 
 
-def placement(
-    members: Iterable[Member], instances: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def placement(members: Members, instances: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """The transforms and flags from which ``tree_over`` makes the same records."""
-    transforms = [np.empty((0, 3, 4)), *(matrices_of(m, instances) for m in members)]
+    transforms = [np.empty((0, 3, 4)), *(matrices_of(m, instances[members.rows(m)]) for m in members)]
     return np.concatenate(transforms), instances.view(np.int64)[:, FLAGS] & ~MIRRORS
 
 
-def matrices_of(member: Member, instances: NDArray[np.float64]) -> NDArray[np.float64]:
+def matrices_of(member: Member, records: NDArray[np.float64]) -> NDArray[np.float64]:
     """The transforms in the records of a member's instances, (k, 3, 4)."""
-    own = instances[member.begin : member.begin + member.count, MATRIX : MATRIX + 12].reshape(-1, 3, 4).copy()
+    own = records[:, MATRIX : MATRIX + 12].reshape(-1, 3, 4).copy()
     own[:, :, :3] *= member.built.tree.scale
     return own
 

@@ -31,6 +31,7 @@ from renderer.rayscene.built import (
 from renderer.rayscene.files import scene_of_files
 from renderer.rayscene.locking import new_lock
 from renderer.rayscene.queries import SceneQueries
+from renderer.rayscene.records import Records
 from renderer.rayscene.store import StoredScene, load_scene, save_scene
 from renderer.rayscene.transforms import as_transforms, place_records
 from renderer.system.threads import checked_threads
@@ -38,7 +39,7 @@ from renderer.trace.instances import FLAGS, HIDDEN
 from renderer.trace.layout import MASK_BITS
 
 # What a copy of a scene has of its own.
-_OWN = ("_lock", "_members", "_instances", "_added", "_count", "_faces", "_next", "_snapshot", "_listed")
+_OWN = ("_lock", "_members", "_records", "_faces", "_next", "_snapshot", "_listed")
 
 
 class RayScene(SceneQueries):
@@ -69,9 +70,8 @@ class RayScene(SceneQueries):
         self.threads = checked_threads(threads)
         self._lock = new_lock()
         self._members: dict[int, Member] = {}
-        # The records of instances, and of those that were added since.
-        self._instances, self._added = new_records(0), list[NDArray[np.float64]]()
-        self._count, self._faces, self._next = 0, 0, 0
+        self._records = Records(Members([]), new_records(0))
+        self._faces, self._next = 0, 0
         # None where the scene, or which members it has, changed since.
         self._snapshot: BuiltScene | None = None
         self._listed: Members | None = None
@@ -166,7 +166,7 @@ class RayScene(SceneQueries):
         outer, there = as_transforms(transforms), scene._built
         with self._lock:
             copies = len(outer)
-            check_sizes(self._count + copies * len(there.top.instances), self._faces + copies * there.count)
+            check_sizes(self._records.count + copies * len(there.top.instances), self._faces + copies * there.count)
             made = {m.id: _composed(outer, there.matrices(m)) for m in there.members}
             for m in there.members:
                 place_records(m.row, new_records(len(made[m.id])), made[m.id])  # refused before any is added
@@ -186,14 +186,14 @@ class RayScene(SceneQueries):
         check_mesh(built.tree)
         with self._lock:
             faces = self._faces + len(matrices) * len(built.mesh.faces)
-            check_sizes(self._count + len(matrices), faces)
-            member = Member(self._next, name, built, self._count, len(matrices), names)
+            check_sizes(self._records.count + len(matrices), faces)
+            member = Member(self._next, name, built, len(matrices), names)
             own = new_records(len(matrices))
             own.view(np.int64)[:, FLAGS] = flags
             place_records(member.row, own, matrices)
             self._members[member.id] = member
-            self._added.append(own)
-            self._count, self._faces, self._next = self._count + len(own), faces, self._next + 1
+            self._records.add(member.id, own)
+            self._faces, self._next = faces, self._next + 1
             self._snapshot = self._listed = None
             return member.id
 
@@ -227,11 +227,11 @@ class RayScene(SceneQueries):
         matrices = as_transforms(transforms)
         with self._lock:
             member = self._member(object)
-            rows = _rows(instances, member.count)
+            rows = self._rows_of(object, instances)
             expect(len(matrices) == len(rows), "transforms", f"{len(rows)} matrices", f"{len(matrices)}")
-            own = self._records[member.begin + rows]
+            own = self._records.array[rows]
             place_records(member.row, own, matrices)
-            self._writable()[member.begin + rows] = own
+            self._writable()[rows] = own
 
     def refit(self, object: int, vertices: ArrayLike) -> None:
         """Move the vertices of an object's mesh, as ``Octree.refit`` does; an octree that was added stays as it was.
@@ -262,12 +262,13 @@ class RayScene(SceneQueries):
             Queries.__init__(octree, *member.built, self.threads)
             octree.refit(vertices)
             refitted = replace(member, built=octree._built)
-            own = self._records[member.begin : member.begin + member.count].copy()
+            rows = self._rows_of(object, None)
+            own = self._records.array[rows]
             try:
-                place_records(refitted.row, own, matrices_of(member, self._records))
+                place_records(refitted.row, own, matrices_of(member, own))
             except ValueError as error:
                 raise MeshError(f"vertices: expected positions that every instance can place; {error}") from None
-            self._writable()[member.begin : member.begin + member.count] = own
+            self._writable()[rows] = own
             self._members[object], self._listed = refitted, None
 
     def show(self, object: int, shown: ArrayLike = True, *, instances: ArrayLike | None = None) -> None:
@@ -316,7 +317,7 @@ class RayScene(SceneQueries):
         array([ True])
         """
         with self._lock:
-            return self._records.view(np.int64)[self._rows_of(object, None), FLAGS] & HIDDEN == 0
+            return self._records.array.view(np.int64)[self._rows_of(object, None), FLAGS] & HIDDEN == 0
 
     def mask(self, object: int, mask: ArrayLike, *, instances: ArrayLike | None = None) -> None:
         """Change the masks of instances of an object.
@@ -363,7 +364,7 @@ class RayScene(SceneQueries):
         array([6])
         """
         with self._lock:
-            return self._records.view(np.int64)[self._rows_of(object, None), FLAGS] & MASK_BITS
+            return self._records.array.view(np.int64)[self._rows_of(object, None), FLAGS] & MASK_BITS
 
     def remove(self, object: int) -> None:
         """Take an object out of the scene. The numbers of others stay.
@@ -389,10 +390,8 @@ class RayScene(SceneQueries):
         """
         with self._lock:
             gone = self._members.pop(self._member(object).id)
-            self._instances = np.delete(self._records, np.s_[gone.begin : gone.begin + gone.count], axis=0)
-            for m in [m for m in self._members.values() if m.begin > gone.begin]:
-                self._members[m.id] = replace(m, begin=m.begin - gone.count)
-            self._count, self._faces = self._count - gone.count, self._faces - gone.count * len(gone.built.mesh.faces)
+            self._records.remove(gone.id)
+            self._faces -= gone.count * len(gone.built.mesh.faces)
             self._snapshot = self._listed = None
 
     @property
@@ -635,8 +634,8 @@ class RayScene(SceneQueries):
     def _keep(self, stored: StoredScene) -> None:
         built = self._snapshot = stored.built
         self._owner, self._next, self._listed = built.owner, stored.next, built.members
-        self._members, self._instances, self._added = {m.id: m for m in built.members}, built.top.instances, []
-        self._count, self._faces = len(self._instances), built.count
+        self._members, self._faces = {m.id: m for m in built.members}, built.count
+        self._records = Records(built.members, built.top.instances)
 
     @property
     def _built(self) -> BuiltScene:
@@ -646,7 +645,8 @@ class RayScene(SceneQueries):
             with self._lock:
                 built = self._snapshot
                 if built is None:
-                    records = self._records
+                    self._records.compact()
+                    records = self._records.array
                     if self._listed is None:
                         self._listed = Members(self._members.values())
                         self._listed.number(records)
@@ -655,29 +655,21 @@ class RayScene(SceneQueries):
         return built
 
     def _member(self, object: int) -> Member:
-        known = isinstance(object, int | np.integer) and object in self._members
-        expect(known, "object", f"one of {str(list(self._members))[:200]}", repr(object))
+        if not (isinstance(object, int | np.integer) and object in self._members):
+            expect(False, "object", f"one of {str(list(self._members))[:200]}", repr(object))
         return self._members[int(object)]
 
     def _rows_of(self, object: int, instances: ArrayLike | None) -> NDArray[np.int64]:
         """The records of instances of an object."""
         member = self._member(object)
-        return member.begin + _rows(instances, member.count)
-
-    @property
-    def _records(self) -> NDArray[np.float64]:
-        """The records of all instances."""
-        if self._added:
-            self._instances, self._added = np.concatenate([self._instances, *self._added]), []
-        return self._instances
+        return self._records.rows(member.id).start + _rows(instances, member.count)
 
     def _writable(self) -> NDArray[np.float64]:
         """The records of all instances, to be changed: not those that a snapshot has."""
-        records = self._records
-        if self._snapshot is not None and records is self._snapshot.top.instances:
-            records = self._instances = records.copy()
+        if self._snapshot is not None and self._records.array is self._snapshot.top.instances:
+            self._records.array = self._records.array.copy()
         self._snapshot = None
-        return records
+        return self._records.array
 
 
 def _composed(outer: NDArray[np.float64], inner: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -90,7 +90,7 @@ def _ignored(scene: BuiltScene, ignore: SceneHits | None) -> NDArray[np.float64]
         return None
     expect(isinstance(ignore, SceneHits), "ignore", "hits of a scene", type(ignore).__name__)
     expect(ignore._scene.owner == scene.owner, "ignore", "hits of this scene", "hits of another")
-    begins = {m.id: (m.begin, m.count) for m in scene.members}
+    begins = {m.id: (scene.members.rows(m).start, m.count) for m in scene.members}
     ignored = np.full(ignore.object.shape, -1.0)
     for id_ in np.unique(ignore.object[ignore.object >= 0]).tolist():
         if id_ in begins:

@@ -87,12 +87,12 @@ def _read(reader: Reader, threads: int) -> StoredScene:
     entries = _entries(described["objects"], following, count)
     octrees = [_octree(reader, number) for number in range(count)]
     reader.expect_end()
-    members, begin = [], 0
+    members = []
     for entry in entries:
         names = tuple(entry.get("names", ()))
-        members.append(Member(entry["id"], entry["name"], octrees[entry["octree"]], begin, entry["instances"], names))
-        begin += entry["instances"]
-    expect(begin == len(transforms), "objects", f"{len(transforms)} instances in all", begin)
+        members.append(Member(entry["id"], entry["name"], octrees[entry["octree"]], entry["instances"], names))
+    placed = sum(member.count for member in members)
+    expect(placed == len(transforms), "objects", f"{len(transforms)} instances in all", placed)
     return StoredScene(BuiltScene(tree_over(members, transforms, flags, threads), threads), following)
 
 

@@ -323,6 +323,29 @@ def test_an_empty_scene_is_hit_by_nothing():
         RayScene().contains([0, 0, 0])
 
 
+def test_objects_come_and_go_in_any_order():
+    """Records of those that are gone stay for a while among the others."""
+    rng, scene, octree, places = np.random.default_rng(10), RayScene(), Octree(box()), {}
+    for _ in range(300):
+        if places and rng.random() < 0.45:
+            gone = rng.choice(list(places))
+            del places[gone]
+            scene.remove(gone)
+        else:
+            own = placed(rng, "steps", int(rng.integers(0, 4)))
+            places[scene.add(octree, own)] = own
+        if places and rng.random() < 0.3:
+            moved = int(rng.choice(list(places)))
+            places[moved] = placed(rng, "steps", len(places[moved]))
+            scene.move(moved, places[moved])
+        if rng.random() < 0.1:
+            scene.any_hit(HERE, DOWN)
+    assert scene.objects == list(places)
+    for object_, own in places.items():
+        np.testing.assert_array_equal(scene.transforms(object_), own)
+    assert_like_merged(scene, 3)
+
+
 def test_an_octree_is_shared_and_a_refit_of_one_object_changes_no_other():
     octree, scene = Octree(box()), RayScene()
     one, other = scene.add(octree), scene.add(octree, [[1, 0, 0, 5], [0, 1, 0, 0], [0, 0, 1, 0]])

@@ -137,7 +137,7 @@ def test_instances_follow_an_object_that_gets_another_place() -> None:
     scene = crowd()
     words = scene._built.top.instances.view(np.int64)
     for m in scene._built.members:
-        assert (words[m.begin : m.begin + m.count, OBJECT] == m.row.ctypes.data).all()
+        assert (words[scene._built.members.rows(m), OBJECT] == m.row.ctypes.data).all()
 
 
 # --- once each --------------------------------------------------------------------------------------------------
