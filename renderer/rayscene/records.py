@@ -29,6 +29,11 @@ class Records:
         self._added.append(own)
         self._end, self.count = self._end + len(own), self.count + len(own)
 
+    def extend(self, object: int, own: Floats) -> None:
+        """Append records to those of an object."""
+        kept = self._kept()
+        self._renew({**kept, object: np.concatenate([kept[object], own])})
+
     def remove(self, object: int) -> None:
         """Forget the records of an object."""
         rows = self._rows.pop(object)
@@ -53,10 +58,15 @@ class Records:
 
     def compact(self) -> None:
         """Take the records of removed objects out of ``array``."""
-        if self._end == self.count:
-            return
-        array, self._end = self.array, 0
-        kept = {object: array[rows] for object, rows in self._rows.items()}
-        self._array, self.count = new_records(0), 0
+        if self._end > self.count:
+            self._renew(self._kept())
+
+    def _kept(self) -> dict[int, Floats]:
+        """The records of each object."""
+        array = self.array
+        return {object: array[rows] for object, rows in self._rows.items()}
+
+    def _renew(self, kept: dict[int, Floats]) -> None:
+        self._array, self._end, self.count = new_records(0), 0, 0
         for object, own in kept.items():
             self.add(object, own)

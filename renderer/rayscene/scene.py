@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 from uuid import uuid4
@@ -188,23 +189,73 @@ class RayScene(SceneQueries):
             faces = self._faces + len(matrices) * len(built.mesh.faces)
             check_sizes(self._records.count + len(matrices), faces)
             member = Member(self._next, name, built, len(matrices), names)
-            own = new_records(len(matrices))
-            own.view(np.int64)[:, FLAGS] = flags
-            place_records(member.row, own, matrices)
+            self._records.add(member.id, _placed(member, matrices, flags))
             self._members[member.id] = member
-            self._records.add(member.id, own)
             self._faces, self._next = faces, self._next + 1
             self._snapshot = self._listed = None
             return member.id
 
-    def move(self, object: int, transforms: ArrayLike, *, instances: ArrayLike | None = None) -> None:
-        """Place the instances of an object anew. A query that runs meanwhile sees the scene before or after.
+    def add_instances(self, object: int, transforms: ArrayLike, *, mask: ArrayLike = MASK_BITS) -> NDArray[np.int64]:
+        """Place an object some more times. Its instances keep their numbers.
 
         Parameters
         ----------
         object : int
         transforms : array_like, shape (3, 4), (4, 4), (k, 3, 4) or (k, 4, 4)
-            As for ``add``, one for each instance that is moved.
+        mask : array_like of int, shape () or (k,), default all bits
+            As for ``add``.
+
+        Returns
+        -------
+        ndarray of int64, shape (k,)
+            The numbers of the new instances, which follow those that the object has.
+
+        Raises
+        ------
+        ValueError
+            As for ``add``; then nothing is added.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box())
+        >>> scene.add_instances(cube, [[1, 0, 0, 5], [0, 1, 0, 0], [0, 0, 1, 0]])
+        array([1])
+        >>> scene.closest_hit([5.5, 0.25, 9], [0, 0, -1]).instance
+        array(1)
+        """
+        expect(transforms is not None, "transforms", "matrices", "None")
+        matrices = as_transforms(transforms)
+        masks, count = _masks(mask, len(matrices)), len(matrices)
+        with self._lock:
+            member = self._member(object)
+            faces = self._faces + count * len(member.built.mesh.faces)
+            check_sizes(self._records.count + count, faces)
+            names = member.names + ("",) * count if member.names else ()
+            self._records.extend(member.id, _placed(member, matrices, masks))
+            self._members[member.id] = replace(member, count=member.count + count, names=names)
+            self._faces, self._snapshot, self._listed = faces, None, None
+            return np.arange(member.count, member.count + count)
+
+    def move(
+        self,
+        object: int | Mapping[int, ArrayLike],
+        transforms: ArrayLike | None = None,
+        *,
+        instances: ArrayLike | None = None,
+    ) -> None:
+        """Place the instances of an object, or of several, anew.
+
+        A query that runs meanwhile sees the scene before or after.
+
+        Parameters
+        ----------
+        object : int, or dict of int to array_like
+            The object; or several, with the transforms of each, that move at once.
+        transforms : array_like, shape (3, 4), (4, 4), (k, 3, 4) or (k, 4, 4)
+            As for ``add``, one for each instance that is moved. None beside a dict.
         instances : array_like of int or bool, optional
             Which k instances: their numbers, or a bool for each of the object; None for all.
 
@@ -218,20 +269,33 @@ class RayScene(SceneQueries):
         >>> from renderer import RayScene
         >>> from renderer.mesh.shapes import box
         >>> scene = RayScene()
-        >>> cube = scene.add(box())
-        >>> scene.move(cube, [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 5]])
+        >>> cube, roof = scene.add(box()), scene.add(box((0, 0, 1), (1, 1, 2)))
+        >>> lifted = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 5]]
+        >>> scene.move(roof, lifted)
+        >>> scene.move({cube: lifted, roof: lifted})
         >>> scene.closest_hit([0.5, 0.25, 9], [0, 0, -1]).t
-        array(3.)
+        array(2.)
         """
-        expect(transforms is not None, "transforms", "matrices", "None")
-        matrices = as_transforms(transforms)
+        several = isinstance(object, Mapping)
+        alone = transforms is None and instances is None
+        expect(alone or not several, "transforms", "None beside a dict, as instances", "matrices or instances")
         with self._lock:
-            member = self._member(object)
-            rows = self._rows_of(object, instances)
-            expect(len(matrices) == len(rows), "transforms", f"{len(rows)} matrices", f"{len(matrices)}")
-            own = self._records.array[rows]
-            place_records(member.row, own, matrices)
-            self._writable()[rows] = own
+            moves = object.items() if isinstance(object, Mapping) else [(object, transforms)]
+            moved = [self._moved(each, given, instances) for each, given in moves]  # refused before any is moved
+            records = self._writable()
+            for rows, own in moved:
+                records[rows] = own
+
+    def _moved(
+        self, object: int, transforms: ArrayLike | None, instances: ArrayLike | None
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Instances of an object, and their records where they are moved to."""
+        expect(transforms is not None, "transforms", "matrices", "None")
+        matrices, rows = as_transforms(transforms), self._rows_of(object, instances)
+        expect(len(matrices) == len(rows), "transforms", f"{len(rows)} matrices", f"{len(matrices)}")
+        own = self._records.array[rows]
+        place_records(self._member(object).row, own, matrices)
+        return rows, own
 
     def refit(self, object: int, vertices: ArrayLike) -> None:
         """Move the vertices of an object's mesh, as ``Octree.refit`` does; an octree that was added stays as it was.
@@ -670,6 +734,14 @@ class RayScene(SceneQueries):
             self._records.array = self._records.array.copy()
         self._snapshot = None
         return self._records.array
+
+
+def _placed(member: Member, matrices: NDArray[np.float64], flags: NDArray[np.int64]) -> NDArray[np.float64]:
+    """The records of new instances."""
+    own = new_records(len(matrices))
+    own.view(np.int64)[:, FLAGS] = flags
+    place_records(member.row, own, matrices)
+    return own
 
 
 def _composed(outer: NDArray[np.float64], inner: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -15,7 +15,7 @@ from renderer.mesh.shapes import box, icosphere
 from renderer.trace.batch import check_rays
 
 pytestmark = pytest.mark.judges(
-    "RayScene", "RayScene.add", "RayScene.add_scene", "RayScene.all_hits", "RayScene.any_hit",
+    "RayScene", "RayScene.add", "RayScene.add_instances", "RayScene.add_scene", "RayScene.all_hits", "RayScene.any_hit",
     "RayScene.closest_hit", "RayScene.closest_point", "RayScene.contains", "RayScene.count_hits",
     "RayScene.count_steps", "RayScene.mask", "RayScene.masks", "RayScene.merged", "RayScene.mesh", "RayScene.move",
     "RayScene.name", "RayScene.objects", "RayScene.refit", "RayScene.remove", "RayScene.show", "RayScene.shown",
@@ -338,6 +338,13 @@ def test_objects_come_and_go_in_any_order():
             moved = int(rng.choice(list(places)))
             places[moved] = placed(rng, "steps", len(places[moved]))
             scene.move(moved, places[moved])
+        if places and rng.random() < 0.3:
+            grown = int(rng.choice(list(places)))
+            own = placed(rng, "steps", int(rng.integers(0, 3)))
+            numbers = scene.add_instances(grown, own, mask=1 << 31)
+            assert numbers.tolist() == list(range(len(places[grown]), len(places[grown]) + len(own)))
+            assert (scene.masks(grown)[numbers] == 1 << 31).all()
+            places[grown] = np.concatenate([places[grown], own])
         if rng.random() < 0.1:
             scene.any_hit(HERE, DOWN)
     assert scene.objects == list(places)
@@ -376,6 +383,29 @@ def test_queries_see_the_scene_before_or_after_a_move():
     for thread in threads:
         thread.join()
     assert seen and all(found in ({8.0}, {4.0}) for found in seen)
+
+
+def test_several_objects_move_at_once():
+    """Queries see both where they were, or both where they are; refused, none has moved."""
+    scene = RayScene()
+    cubes = [scene.add(box((x, 0, 0), (x + 1, 1, 1))) for x in (0, 3)]
+    origins, ends, seen = [[0.3, 0.4, 9.0], [3.3, 0.4, 9.0]], threading.Event(), set()
+    low, high = np.eye(4), np.eye(4) + np.outer([0, 0, 1, 0], [0, 0, 0, 4])
+
+    def query():
+        while not ends.is_set():
+            seen.add(tuple(scene.closest_hit(origins, [0, 0, -1]).t.tolist()))
+
+    thread = threading.Thread(target=query)
+    thread.start()
+    for k in range(200):
+        scene.move(dict.fromkeys(cubes, high if k % 2 else low))
+    ends.set()
+    thread.join()
+    assert seen <= {(8.0, 8.0), (4.0, 4.0)}
+    with pytest.raises(ValueError, match="transforms: expected 1 matrices, got 2"):
+        scene.move({cubes[0]: low, cubes[1]: [low, low]})
+    assert scene.closest_hit(origins, [0, 0, -1]).t.tolist() == [4, 4]
 
 
 def test_inside_and_distance_of_closed_parts_that_overlap():
@@ -498,6 +528,11 @@ FAULTS = {
     "instances: expected 1 bools, or integers, got bools of shape .2,.": lambda s: s.show(0, instances=[True, False]),
     "shown: expected an array, got rows of different lengths": lambda s: s.show(0, [[True], [True, False]]),
     "mask: expected an array, got rows of different lengths": lambda s: s.any_hit(HERE, DOWN, mask=[[1], [1, 2]]),
+    "transforms: expected None beside a dict": lambda s: s.move({0: np.eye(4)}, np.eye(4)),
+    "object: expected one of .0., got 5": lambda s: s.move({0: np.eye(4) * [2, 2, 2, 1], 5: np.eye(4)}),
+    "transforms: expected matrices that can be inverted.* for instance 0": lambda s: s.add_instances(
+        0, np.zeros((3, 4))
+    ),
     "mask: expected an integer from 0 to 4294967295 or None, got .1.": lambda s: s.closest_point(HERE, mask=[1]),
     "transforms: expected matrices, got None": lambda s: s.move(0, None),
     "vertices: expected positions that every instance can place": lambda s: s.refit(0, box().vertices * 1e30),
