@@ -64,10 +64,8 @@ def _octants(tree: Tree, nodes: NDArray[np.int64]) -> tuple[Boxes, NDArray[np.in
 
 def _root_box(tree: Tree) -> Boxes:
     """The box around the root's octants as the only row of (1, 6) float64; no row if there are none."""
-    if not len(tree.nodes):
-        return np.empty((0, 6))
-    lower, upper = root_box(tree.nodes)
-    return np.concatenate([lower, upper])[None][: lower[0] <= upper[0]]
+    box = np.concatenate(root_box(tree.nodes)) if len(tree.nodes) else np.empty(0)
+    return box.reshape(-1, 6) if len(box) and box[0] <= box[3] else np.empty((0, 6))
 
 
 def visited(octree: Octree | BruteForce, origin: ArrayLike, direction: ArrayLike, t_max: float = np.inf) -> list[Visit]:
