@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -20,10 +20,7 @@ class PlacesOnFaces:
 
     __slots__ = ()
     face: NDArray[np.int64]
-
-    def interpolate(self, values: Any, *, on: Owner | None = None) -> NDArray[np.float64]:
-        """Values at the places."""
-        raise NotImplementedError
+    interpolate: Callable[..., NDArray[np.float64]]
 
     def _vertex_values(self, name: str) -> Any:
         """An attribute of the meshes, as ``interpolate`` takes it; None if none has it."""
