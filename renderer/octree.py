@@ -18,7 +18,7 @@ from renderer.mesh.load import load_mesh
 from renderer.mesh.mesh import Mesh, Repairs, foreign_arrays
 from renderer.queryable import Built, Queries
 from renderer.system.threads import checked_threads
-from renderer.trace.layout import BLOCK_FACES, CHILDREN, MAX_LEAF_BLOCKS, NODE_WORDS, Tree
+from renderer.trace.layout import BLOCK_FACES, CHILDREN, MAX_LEAF_BLOCKS, NODE_WORDS, Tree, root_box
 from renderer.tree.build import SPLITS, build_blocks, build_tree
 from renderer.tree.hierarchy import Rule
 from renderer.tree.refit import refit_tree
@@ -509,8 +509,8 @@ def _cost(tree: Tree) -> float:
     children, used = _octants(tree)
     extents = np.where(used[:, None], np.float64(rows[:, :, 1]) - rows[:, :, 0], 0.0)
     areas = (extents * np.roll(extents, 1, axis=1)).sum(axis=1)
-    lower, upper = rows[0, :, 0].min(axis=1), rows[0, :, 1].max(axis=1)
-    x, y, z = np.float64(upper) - lower
+    lower, upper = root_box(tree.nodes)
+    x, y, z = upper - lower
     whole = x * y + y * z + z * x
     shares = areas / whole if 0.0 < whole < np.inf else used.astype(np.float64)
     blocks = np.where(children < 0, (~children & (MAX_LEAF_BLOCKS - 1)) + 1, 1)

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box
 from renderer.rayscene.scene import RayScene
-from renderer.trace.instances import MASK_BITS
+from renderer.trace.layout import MASK_BITS
 from validation.oracle.placing import Body
 
 Floats = NDArray[np.float64]

@@ -40,6 +40,14 @@ def real_argument(argument: str, values: Any) -> NDArray[Any]:
         raise ValueError(f"{argument}: {error}") from None
 
 
+def plain_argument(argument: str, values: Any) -> NDArray[Any]:
+    """``plain_array``, with the argument's name in its error."""
+    try:
+        return plain_array(values)
+    except ValueError as error:
+        raise ValueError(f"{argument}: {error}") from None
+
+
 def flag_argument(argument: str, value: object) -> bool:
     """A bool of Python or NumPy; anything else is an error that names the argument."""
     expect(isinstance(value, bool | np.bool_), argument, "True or False", repr(value))

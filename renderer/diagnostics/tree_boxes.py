@@ -18,7 +18,7 @@ from renderer.octree import BruteForce, Octree
 from renderer.trace.batch import check_rays
 from renderer.trace.best import NO_FACE, FaceHit, hit_on
 from renderer.trace.intersect import Ray, box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
-from renderer.trace.layout import CHILDREN, NODE_WORDS, Tree
+from renderer.trace.layout import CHILDREN, NODE_WORDS, Tree, root_box
 from renderer.trace.leaf import nearest_carefully
 from renderer.trace.trees import tree_pointers
 from renderer.trace.walk import blocks_of
@@ -64,10 +64,8 @@ def _octants(tree: Tree, nodes: NDArray[np.int64]) -> tuple[Boxes, NDArray[np.in
 
 def _root_box(tree: Tree) -> Boxes:
     """The box around the root's octants as the only row of (1, 6) float64; no row if there are none."""
-    boxes, _ = _octants(tree, np.zeros(min(1, len(tree.nodes)), np.int64))
-    if not len(boxes):
-        return boxes
-    return np.concatenate([boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)])[None]
+    box = np.concatenate(root_box(tree.nodes)) if len(tree.nodes) else np.empty(0)
+    return box.reshape(-1, 6) if len(box) and box[0] <= box[3] else np.empty((0, 6))
 
 
 def visited(octree: Octree | BruteForce, origin: ArrayLike, direction: ArrayLike, t_max: float = np.inf) -> list[Visit]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +27,17 @@ from renderer.trace.walk import stack_size
 _LEAST = 1024
 
 
-def closest_point(tree: Tree, mesh: Mesh, points: ArrayLike, max_distance: ArrayLike, threads: int) -> ClosestPoints:
-    """The nearest point of the mesh to each point, see ``Octree.closest_point``."""
+class Counted(NamedTuple):
+    """What counts in a scene: the ``mask`` of ``find_nearest``, and the numbers and corners of the faces."""
+
+    mask: int
+    faces: Callable[[], tuple[NDArray[np.int64], NDArray[np.float64]]]
+
+
+def closest_point(
+    tree: Tree, mesh: Mesh, points: ArrayLike, max_distance: ArrayLike, threads: int, counted: Counted | None = None
+) -> ClosestPoints:
+    """The nearest point of the mesh to each point, see ``Octree.closest_point``; in a scene of what is ``counted``."""
     expect(len(mesh.faces) > 0, "mesh", "faces", "none")
     given, shape = check_points("points", points, farthest_of(tree.scale))
     limits = _limits(max_distance)
@@ -38,25 +48,26 @@ def closest_point(tree: Tree, mesh: Mesh, points: ArrayLike, max_distance: Array
         given = np.array(np.broadcast_to(given, (*shape, 3))).reshape(-1, 3)
         limits = np.array(np.broadcast_to(limits, shape))
     limits = limits.reshape(-1)
-    out = np.empty((HIT_ROWS, len(given)))
+    out, mask = np.empty((HIT_ROWS, len(given))), -1 if counted is None else counted.mask
 
     def find(rows: NDArray[np.int64], some: NDArray[np.float64]) -> Iterator[None]:
         size = stack_size(tree.depth) + LISTED
         integers, doubles, done = np.empty(size, np.int64), np.empty(size + 9), 0
         while done < len(some):
-            done = find_nearest(tree.descriptor, some, rows, limits, out, integers, doubles, done)
+            done = find_nearest(tree.descriptor, some, rows, limits, mask, out, integers, doubles, done)
             yield
 
     least = _LEAST if tree.has_nodes else min(_LEAST, rays_against_blocks(tree))
     search_in_order(find, given, mesh, None, least, threads)
     faces = out[3].view(np.int64)
     undecided = np.flatnonzero(faces == UNDECIDED_FACE)
-    triangles = mesh.triangles if len(undecided) else np.empty((0, 3, 3))
+    if len(undecided):
+        numbers, triangles = (np.arange(len(mesh.faces)), mesh.triangles) if counted is None else counted.faces()
     for row in undecided:
         distance, u, v, face = nearest_exactly(given[row], triangles, tree.scale)
         hit = distance <= limits[row if len(limits) > 1 else 0]
         out[:3, row] = (distance, u, v) if hit else (np.inf, np.nan, np.nan)
-        faces[row] = face if hit else -1
+        faces[row] = numbers[face] if hit else -1
     distance, u, v = (row.reshape(shape) for row in out[:3])
     return ClosestPoints(distance, faces.reshape(shape), u, v, mesh)
 

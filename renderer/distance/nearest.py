@@ -78,9 +78,10 @@ class Scratch(NamedTuple):
 
 
 class _Query(NamedTuple):
-    """A point, and the scratch of its search."""
+    """A point, the mask of the instances that count or -1, and the scratch of its search."""
 
     point: Point
+    mask: int
     scratch: Scratch
 
 
@@ -93,11 +94,12 @@ class _Found(NamedTuple):
 
 
 @kernel
-def find_nearest(descriptor, points, rows, limits, out, integers, doubles, begin):
+def find_nearest(descriptor, points, rows, limits, mask, out, integers, doubles, begin):
     """Write distance, u, v and face (or UNDECIDED_FACE) of ``points``, from row ``begin`` on, to ``out[:, rows]``.
 
     out        (4, m) float64
     limits     (m,) or (1,), the largest distance that counts
+    mask       in a scene, bits of which the instances that count have one; -1 for all instances
     integers   memory for ``walk.stack_size`` and LISTED int64; ``doubles``, for as many float64 and nine more
 
     Returns the row before which it ended, early after WORK, so that Ctrl-C need not wait.
@@ -120,7 +122,7 @@ def find_nearest(descriptor, points, rows, limits, out, integers, doubles, begin
         limit = limits[row if len(limits) > 1 else 0]
         point = Point(0, 4, 8, tree.scale * load(p, 0), tree.scale * load(p, 1), tree.scale * load(p, 2))
         store(parts, UNDECIDED_FLAG, 0.0)
-        near = _search(tree, point, minimum(limit * tree.scale * _MORE, _FARTHEST), scratch)
+        near = _search(tree, _Query(point, mask, scratch), minimum(limit * tree.scale * _MORE, _FARTHEST))
         # rule: distance-in-mesh-units
         distance = near.distance / tree.scale
         face = near.face
@@ -157,9 +159,9 @@ def _is_scaled(point, p, scale):
 
 
 @kernel
-def _search(tree, point, limit, scratch):
+def _search(tree, query, limit):
     """The ``Nearest`` face within ``limit``."""
-    query, none = _Query(point, scratch), Nearest(np.inf, np.int32(NO_FACE), 0.0, 0.0)
+    none, scratch = Nearest(np.inf, np.int32(NO_FACE), 0.0, 0.0), query.scratch
     store(scratch.near, 0, 0.0)
     found = walk_nearest_first(
         tree, scratch.children, query, _Found(none, np.int64(0), limit), _reaches, _enter, _visit
@@ -174,6 +176,8 @@ def _reaches(query, k, found):
 
 @inlined
 def _enter(tree, query, node, found, top):
+    if query.mask >= 0 and not tree.ways.may_hit(tree, node, query.mask, -1):
+        return found, top
     nodes, base = boxes_of(tree, node)
     bits = _bound_boxes(nodes, base, query.point, splat4(_squared(found.limit)), query.scratch.squares)
     return found, _push_nearest_last(tree, node, bits, query.scratch, top)

@@ -10,8 +10,10 @@ from uuid import uuid4
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.distance.closest import Counted
 from renderer.errors import expect, expect_known
 from renderer.lazy import lazy
+from renderer.mesh.mending import enclosed_share
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.queryable import Built
@@ -28,7 +30,6 @@ from renderer.trace.instances import (
     INSTANCE_COUNT,
     INSTANCE_WORDS,
     INSTANCES,
-    MASK_BITS,
     MATRIX,
     MESH_FACES,
     MIDDLE,
@@ -45,21 +46,27 @@ from renderer.trace.layout import (
     BLOCK_WORDS,
     CHILDREN,
     LEAF_BITS,
+    MASK_BITS,
     NODE_WORDS,
     TREE_WORDS,
     UNUSED,
     Tree,
     cache_aligned,
+    root_box,
 )
 from renderer.tree.build import SPLITS, build_nodes, new_faces
 from renderer.tree.hierarchy import Rule
 
 # The faces of a scene are numbered by int32, and the largest number means none.
 MOST_FACES = np.iinfo(np.int32).max - 1
+# So many that a block of the last one, times BLOCK_WORDS, is an int64.
+MOST_INSTANCES = (1 << 63 - NUMBER_BITS) // BLOCK_WORDS - 1
 # The sides of faces that rays may hit, as ``trace.instances`` numbers them.
 SIDES = ("both", "front", "back")
 # A block and the place in it share a number with the instance.
 _MOST_BLOCKS = (1 << NUMBER_BITS) // BLOCK_WORDS
+# The share of its box that a mesh encloses for certain, whatever is rounded.
+_ENCLOSED = 1e-6
 # Faces that are looked for together: a tenth of a millisecond.
 _CHUNK = 4096
 _RULE = Rule(SPLITS["midpoint"], 1, 32)
@@ -71,18 +78,17 @@ def _new_id() -> str:
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """A mesh of a scene with its tree, and where its instances are among all; ``names`` are theirs, if any."""
+    """A mesh of a scene with its tree, and the number of its instances; ``names`` are theirs, if any."""
 
     id: int
     name: str
     built: Built
-    begin: int
     count: int
     names: tuple[str, ...] = ()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copy and pickle without the addresses."""
-        return Member, (self.id, self.name, self.built, self.begin, self.count, self.names)
+        return Member, (self.id, self.name, self.built, self.count, self.names)
 
     @lazy
     def row(self) -> NDArray[np.int64]:
@@ -92,38 +98,50 @@ class Member:
         row[:TREE_WORDS] = tree.descriptor
         row[VERTICES], row[MESH_FACES] = mesh.vertices.ctypes.data, mesh.faces.ctypes.data
         # Of the faces: a vertex that none of them has may be anywhere.
-        rows = tree.nodes[:CHILDREN].reshape(3, 2, 8).astype(np.float64) if len(mesh.faces) else np.zeros((3, 2, 8))
-        lower, upper = rows[:, 0].min(axis=1), rows[:, 1].max(axis=1)
+        lower, upper = root_box(tree.nodes) if len(mesh.faces) else (np.zeros(3), np.zeros(3))
         numbers = row.view(np.float64)
         numbers[MIDDLE : MIDDLE + 3] = lower / 2 + upper / 2
         # A rounding more, so that the box is around all corners.
         numbers[HALF : HALF + 3] = np.where(upper > lower, np.nextafter((upper - lower) / 2, np.inf), 0.0)
         return row
 
+    @lazy
+    def encloses(self) -> bool:
+        """Whether the mesh is closed and, as its faces are turned, encloses more than nothing; so do copies then."""
+        mesh = self.built.mesh
+        return mesh.is_closed() and enclosed_share(mesh.bounds, mesh.triangles) > _ENCLOSED
+
 
 class Members:
     """The members of a scene in order, and what a tree over their instances needs of them.
 
     table  (m + 1, 2) int64, the first instance and the number of each, and the number of instances last
-    filled (n,) bool, whether each instance has faces
+    sizes  (n,) int64, the number of faces of each instance
     """
 
     def __init__(self, members: Iterable[Member]) -> None:
         self.listed = list(members)
         counts = np.array([m.count for m in self.listed], np.int64)
         faces = np.array([len(m.built.mesh.faces) for m in self.listed], np.int64)
-        self.faces, self.filled = int((counts * faces).sum()), np.repeat(faces > 0, counts)
-        self.table = np.array([(m.begin, m.id) for m in self.listed] + [(int(counts.sum()), -1)], np.int64)
+        self.faces, self.sizes = int((counts * faces).sum()), np.repeat(faces, counts)
+        begins, ids = np.concatenate([[0], counts.cumsum()]), [m.id for m in self.listed]
+        self.table = np.stack([begins, np.array([*ids, -1])], axis=1)
+        self._begins = dict(zip(ids, begins.tolist(), strict=False))
         self.depth = max((m.built.tree.depth for m in self.listed), default=0)
 
     def __iter__(self) -> Iterator[Member]:
         return iter(self.listed)
 
+    def rows(self, member: Member) -> slice:
+        """Where a member's instances are among all."""
+        begin = self._begins[member.id]
+        return slice(begin, begin + member.count)
+
     def number(self, instances: NDArray[np.float64]) -> None:
         """Write the number of the first face of each instance, and the address of its object."""
         words, first = instances.view(np.int64), 0
         for m in self:
-            own = words[m.begin : m.begin + m.count]
+            own = words[self.rows(m)]
             faces = len(m.built.mesh.faces)
             own[:, OBJECT] = m.row.ctypes.data
             own[:, FIRST_FACE] = first + faces * np.arange(m.count)
@@ -137,8 +155,8 @@ class SceneTree:
 
     def __init__(self, members: Members, instances: NDArray[np.float64], threads: int) -> None:
         words = instances.view(np.int64)
-        shown = np.flatnonzero((words[:, FLAGS] & HIDDEN == 0) & members.filled)
-        self.members, self.instances, self.is_empty = members, instances, not len(shown)
+        shown = np.flatnonzero((words[:, FLAGS] & HIDDEN == 0) & (members.sizes > 0))
+        self.members, self.instances, self.faces_shown = members, instances, int(members.sizes[shown].sum())
         self.nodes, levels = _top(instances, words, shown, threads)
         self.depth = levels + members.depth + 1
 
@@ -233,7 +251,7 @@ class BuiltScene:
 
     @lazy
     def _alone(self) -> Tree | None:
-        if len(self.top.instances) != 1 or self.top.is_empty:
+        if len(self.top.instances) != 1 or not self.top.faces_shown:
             return None
         plain = self.top.instances.view(np.int64)[0, FLAGS] == MASK_BITS
         only = next(m for m in self.members if m.count)
@@ -247,8 +265,7 @@ class BuiltScene:
 
     def flags(self, member: Member) -> NDArray[np.int64]:
         """The masks of a member's instances, with HIDDEN of those that are not shown."""
-        own = self.top.instances.view(np.int64)[member.begin : member.begin + member.count, FLAGS]
-        return own & (MASK_BITS | HIDDEN)
+        return self.top.instances.view(np.int64)[self.members.rows(member), FLAGS] & (MASK_BITS | HIDDEN)
 
     @property
     def mesh(self) -> Any:
@@ -257,14 +274,13 @@ class BuiltScene:
 
     @property
     def faces(self) -> range:
-        """The numbers of the faces of all instances; none if nothing is shown."""
-        return range(0 if self.top.is_empty else self.count)
+        """As many as faces are shown; ``count`` numbers them all."""
+        return range(self.top.faces_shown)
 
     @lazy
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """A box around all that is shown."""
-        rows = self.top.nodes[:CHILDREN].reshape(3, 2, 8)
-        return rows[:, 0].min(axis=1).astype(np.float64), rows[:, 1].max(axis=1).astype(np.float64)
+        return root_box(self.top.nodes)
 
     @property
     def vertices(self) -> NDArray[np.float64]:
@@ -292,8 +308,8 @@ class BuiltScene:
         return edges
 
     def is_closed(self) -> bool:
-        """``Mesh.is_closed`` of the merged mesh, which is closed if all placed meshes are."""
-        return all(m.built.mesh.is_closed() for m in self.members) or self.merged.mesh.is_closed()
+        """``Mesh.is_closed`` of the merged mesh: closed meshes are closed together, unless they cancel."""
+        return all(m.encloses for m in self.members) or self.merged.mesh.is_closed()
 
     @lazy
     def merged(self) -> Octree:
@@ -302,15 +318,14 @@ class BuiltScene:
 
     def _placed(self) -> Iterator[Mesh]:
         """The mesh of each instance that is shown."""
-        flags = self.top.instances.view(np.int64)[:, FLAGS]
         for m in self.members:
-            for matrix, flag in zip(self.matrices(m), flags[m.begin :], strict=False):
+            for matrix, flag in zip(self.matrices(m), self.flags(m), strict=True):
                 if flag & HIDDEN == 0:
                     yield m.built.mesh.transformed(np.concatenate([matrix, [[0.0, 0.0, 0.0, 1.0]]]))
 
     def matrices(self, member: Member) -> NDArray[np.float64]:
         """The transforms of a member's instances, (k, 3, 4)."""
-        return matrices_of(member, self.top.instances)
+        return matrices_of(member, self.top.instances[self.members.rows(member)])
 
     def located(self, faces: NDArray[np.int64], u: NDArray[np.float64], v: NDArray[np.float64]) -> Located:
         """Where faces of the scene (...) and places on them are; -1 for -1."""
@@ -336,6 +351,24 @@ class BuiltScene:
         corners_of_faces(self.top.descriptor, np.ascontiguousarray(faces), corners)
         return corners
 
+    def counted(self, mask: int | None) -> Counted:
+        """What is shown and, with a mask, has a bit of it, as ``closest_point`` takes it."""
+
+        def faces() -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+            flags = self.top.instances.view(np.int64)[:, FLAGS]
+            chosen = (flags & HIDDEN == 0) & (mask is None or flags & mask != 0)
+            numbers = np.flatnonzero(np.repeat(chosen, self.members.sizes))
+            return numbers, self.corners(numbers)
+
+        return Counted(-1 if mask is None else mask, faces)
+
+    def mesh_of(self, faces: NDArray[np.int64]) -> tuple[Mesh, NDArray[np.int64]]:
+        """Faces of the scene (k,), placed, as a mesh of their own, and their numbers there; -1 for -1."""
+        known, numbers = faces >= 0, np.full(len(faces), -1)
+        corners = self.corners(faces[known])
+        numbers[known] = np.arange(len(corners))
+        return Mesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)), numbers
+
 
 def tree_over(
     members: list[Member], transforms: NDArray[np.float64], flags: NDArray[np.int64], threads: int
@@ -344,34 +377,33 @@ def tree_over(
 
     Raises ``ValueError`` for what cannot be placed.
     """
+    listed = Members(members)
+    check_sizes(len(transforms), listed.faces)
     instances = new_records(len(transforms))
     instances.view(np.int64)[:, FLAGS] = flags
     for m in members:
-        own = np.s_[m.begin : m.begin + m.count]
+        own = listed.rows(m)
         place_records(m.row, instances[own], transforms[own])
-    listed = Members(members)
-    check_sizes(listed.faces)
     listed.number(instances)
     return SceneTree(listed, instances, threads)
 
 
-def placement(
-    members: Iterable[Member], instances: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def placement(members: Members, instances: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """The transforms and flags from which ``tree_over`` makes the same records."""
-    transforms = [np.empty((0, 3, 4)), *(matrices_of(m, instances) for m in members)]
+    transforms = [np.empty((0, 3, 4)), *(matrices_of(m, instances[members.rows(m)]) for m in members)]
     return np.concatenate(transforms), instances.view(np.int64)[:, FLAGS] & ~MIRRORS
 
 
-def matrices_of(member: Member, instances: NDArray[np.float64]) -> NDArray[np.float64]:
+def matrices_of(member: Member, records: NDArray[np.float64]) -> NDArray[np.float64]:
     """The transforms in the records of a member's instances, (k, 3, 4)."""
-    own = instances[member.begin : member.begin + member.count, MATRIX : MATRIX + 12].reshape(-1, 3, 4).copy()
+    own = records[:, MATRIX : MATRIX + 12].reshape(-1, 3, 4).copy()
     own[:, :, :3] *= member.built.tree.scale
     return own
 
 
-def check_sizes(faces: int) -> None:
-    """Raise ``ValueError`` for more faces than a scene can number."""
+def check_sizes(instances: int, faces: int) -> None:
+    """Raise ``ValueError`` for more instances or faces than a scene can number."""
+    expect(instances <= MOST_INSTANCES, "scene", f"at most {MOST_INSTANCES:,} instances", f"{instances:,}")
     expect(faces <= MOST_FACES, "scene", f"at most {MOST_FACES:,} faces, copies counted", f"{faces:,}")
 
 

@@ -20,7 +20,7 @@ from renderer.queryable import Built
 from renderer.rayscene.built import BuiltScene, Member, tree_over
 from renderer.rayscene.store import StoredScene
 from renderer.rayscene.transforms import as_transforms, can_be_inverted
-from renderer.trace.instances import MASK_BITS
+from renderer.trace.layout import MASK_BITS
 
 
 class _Object(NamedTuple):
@@ -34,11 +34,10 @@ class _Object(NamedTuple):
 def scene_of_files(paths: FilePaths, threads: int) -> StoredScene:
     """The scene in mesh files, see ``RayScene.from_files``."""
     members: list[Member] = []
-    transforms, begin = [np.empty((0, 3, 4))], 0
+    transforms = [np.empty((0, 3, 4))]
     for built, own, names in _objects(paths, threads):
-        members.append(Member(len(members), built.mesh.name, built, begin, len(own), names))
+        members.append(Member(len(members), built.mesh.name, built, len(own), names))
         transforms.append(own)
-        begin += len(own)
     matrices = np.concatenate(transforms)
     try:
         tree = tree_over(members, matrices, np.full(len(matrices), MASK_BITS), threads)
@@ -73,7 +72,7 @@ def _invertible(placed: Placed, threads: int) -> Iterator[_Object]:
     """A mesh with the instances that can be inverted, and each other one as a mesh in the world."""
     mesh, matrices, names = placed
     built, transforms = Octree(mesh, threads=threads)._built, as_transforms(matrices)
-    good = can_be_inverted(Member(0, "", built, 0, 0).row, transforms)
+    good = can_be_inverted(Member(0, "", built, 0).row, transforms)
     if good.any():
         yield _Object(built, transforms[good], tuple(compress(names, good)))
     for row in np.flatnonzero(~good):

@@ -6,24 +6,30 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from renderer.errors import expect
 from renderer.lazy import lazy
 from renderer.mesh.mesh import Mesh, face_normals
 from renderer.mesh.values import Owner, interpolated
 from renderer.rayscene.built import BuiltScene, Located
+from renderer.results.attributes import PlacesOnFaces, Values
 from renderer.results.closest_points import ClosestPoints
 from renderer.results.hits import AllHits, Hits, Passage
 
-Values = ArrayLike | Mapping[int, ArrayLike]
 
-
-class _Places:
+class _Places(PlacesOnFaces):
     """Places on faces of a scene, ``(...)`` or ``(m,)``."""
+
+    # The arrays that ``repr`` shows first, as that of an octree's hits does.
+    _own: tuple[str, ...] = ("t", "side", "t_error")
 
     def __init__(self, found: Hits | AllHits | ClosestPoints, scene: BuiltScene) -> None:
         self._found, self._scene = found, scene
+
+    def __repr__(self) -> str:
+        names = (*self._own, "object", "instance", "face", "u", "v")
+        return f"{type(self).__name__}({', '.join(f'{name}={getattr(self, name)!r}' for name in names)})"
 
     @lazy
     def _at(self) -> Located:
@@ -61,7 +67,7 @@ class _Places:
         return self._at.instance
 
     @property
-    def face(self) -> NDArray[np.int64]:
+    def face(self) -> NDArray[np.int64]:  # type: ignore[override]  # computed when it is read
         """The faces of the objects' meshes, (...) int64; -1 on a miss.
 
         Examples
@@ -193,66 +199,10 @@ class _Places:
             found[own] = at
         return np.full(self.face.shape, np.nan) if found is None else found
 
-    def take(self, values: Values) -> NDArray[np.float64]:
-        """Return values of the faces that were hit, as ``interpolate`` with ``on="faces"``.
-
-        Parameters
-        ----------
-        values : array_like, or dict of int to array_like
-            A row for each face of each object.
-
-        Returns
-        -------
-        ndarray of float64, shape (..., ...)
-            nan on a miss.
-
-        Examples
-        --------
-        >>> from renderer import RayScene
-        >>> from renderer.mesh.shapes import box
-        >>> scene = RayScene()
-        >>> cube = scene.add(box())
-        >>> scene.closest_hit([[0.5, 0.25, 3], [5, 5, 5]], [0, 0, -1]).take(range(12))
-        array([10., nan])
-        """
-        return self.interpolate(values, on="faces")
-
-    @property
-    def colors(self) -> NDArray[np.float64]:
-        """The vertex colours at the hits, (..., 3) float64; nan on a miss, and on meshes without colours.
-
-        Examples
-        --------
-        >>> from renderer import RayScene
-        >>> from renderer.mesh.shapes import box
-        >>> scene = RayScene()
-        >>> cube = scene.add(box())
-        >>> scene.closest_hit([0.5, 0.25, 3], [0, 0, -1]).colors
-        array([nan, nan, nan])
-        """
-        return self._attribute(lambda mesh: mesh.colors, 3)
-
-    @property
-    def texcoords(self) -> NDArray[np.float64]:
-        """The texture coordinates at the hits, (..., 2) float64; nan on a miss, and on meshes without them.
-
-        Examples
-        --------
-        >>> from renderer import RayScene
-        >>> from renderer.mesh.shapes import box
-        >>> scene = RayScene()
-        >>> cube = scene.add(box())
-        >>> scene.closest_hit([0.5, 0.25, 3], [0, 0, -1]).texcoords
-        array([nan, nan])
-        """
-        return self._attribute(lambda mesh: mesh.texcoords, 2)
-
-    def _attribute(self, of: Callable[[Mesh], Any], width: int) -> NDArray[np.float64]:
+    def _vertex_values(self, name: str) -> Any:
         meshes = {member.id: member.built.mesh for member in self._scene.members}
-        values = {id_: of(mesh) for id_, mesh in meshes.items() if of(mesh) is not None}
-        if not values:
-            return np.full((*self.face.shape, width), np.nan)
-        return self.interpolate(values, on="vertices")
+        values = {id_: getattr(mesh, name) for id_, mesh in meshes.items()}
+        return {id_: own for id_, own in values.items() if own is not None} or None
 
 
 def _by_object(values: Values, meshes: dict[int, Mesh]) -> dict[int, Any]:
@@ -400,6 +350,7 @@ class SceneAllHits(_Places):
     """
 
     _found: AllHits
+    _own = ("offsets", "t", "side", "t_error")
 
     def __init__(self, hits: AllHits, scene: BuiltScene) -> None:
         super().__init__(hits, scene)
@@ -454,6 +405,8 @@ class SceneClosestPoints(_Places):
     >>> near.distance, near.object
     (array([ 2., inf]), array([ 0, -1]))
     """
+
+    _own = ("distance",)
 
     def __init__(self, near: ClosestPoints, scene: BuiltScene) -> None:
         super().__init__(near, scene)

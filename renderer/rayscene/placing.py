@@ -45,6 +45,9 @@ from renderer.tree.bounds import BOX, FACE
 SINGULAR = 2.0**-20
 # The largest coordinate of a scene, as that of a mesh's boxes (``octree``).
 LARGEST = 2.0**60
+# The largest component of a matrix and of its inverse, in units in which the mesh's coordinates are near 1: boxes, and
+# rays turned into the mesh's frame, are float32 and neither overflow nor lose digits.
+STEEPEST = 2.0**120
 # Roundings of a placed corner, of the placed middle and of the inverse, eight each and room.
 _ROUNDED = 2.0**-48
 
@@ -54,7 +57,8 @@ def place(matrices, instances, words, begin, end):
     """Write matrix, inverse, place, room and the flag of mirrors of the instances begin:end, whose objects are written.
 
     ``matrices`` (k, 3, 4) float64; ``instances`` (k, INSTANCE_WORDS) float64 and ``words`` are the same memory. Returns
-    the first one whose matrix is singular or nearly so, or whose coordinates are too large, or -1.
+    the first one whose matrix is singular or nearly so, whose coordinates are too large, or whose factors are too large
+    or too small; or -1.
     """
     for i in range(begin, end):
         record, flags = offset(pointer(instances), i * INSTANCE_WORDS), offset(pointer(words), i * INSTANCE_WORDS)
@@ -109,8 +113,8 @@ def _put_room(record, own):
 
     A point p of the mesh, placed at x, comes back at p + E (p - middle) + inverse times the rounding of x, where E is
     the inverse times the matrix, less 1. Beside that, a hit may be DISTANCE_ROOM of its distance beside its face: that
-    of the middle counts with the ray, that of the face from the middle here. Returns whether E and all coordinates are
-    small enough.
+    of the middle counts with the ray, that of the face from the middle here. Returns whether E, all coordinates and all
+    factors are small enough.
     """
     far, matrix, inverse = 0.0, offset(record, MATRIX), offset(record, INVERSE)
     for k in range(3):
@@ -121,12 +125,14 @@ def _put_room(record, own):
         store(record, PLACE + k, place)
         far = maximum(far, reach)
         # False for NaN too.
-        if not abs(place) + reach <= LARGEST:
+        if not (abs(place) + reach <= LARGEST and _size(matrix, own, k) <= STEEPEST):
             return False
     worst = 0.0
     for k in range(3):
         room = 0.0
         for j in range(3):
+            if not maximum(abs(load(matrix, 4 * k + j)), abs(load(inverse, 3 * k + j))) <= STEEPEST:
+                return False
             off, size = -1.0 if j == k else 0.0, 0.0
             for n in range(3):
                 off += load(inverse, 3 * k + n) * load(matrix, 4 * n + j)

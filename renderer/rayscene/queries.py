@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from renderer.all_hits.all_hits import all_hits, count_hits
 from renderer.arguments.arrays import flag_argument
+from renderer.arguments.counts import count_argument
 from renderer.arguments.types import ArrayLike
 from renderer.distance.closest import closest_point
 from renderer.distance.signed import signed_distance
 from renderer.inside.contains import contains
-from renderer.mesh.mesh import Mesh
 from renderer.rayscene.built import BuiltScene
 from renderer.rayscene.hits import SceneAllHits, SceneClosestPoints, SceneHits
 from renderer.rayscene.starting import Choice, Leaving, rays_of
@@ -22,7 +22,7 @@ from renderer.results.steps import Steps
 from renderer.trace.batch import RayBatch
 from renderer.trace.closest import any_hits, closest_hits
 from renderer.trace.error import errors_of
-from renderer.trace.instances import MASK_BITS
+from renderer.trace.layout import MASK_BITS
 from renderer.trace.steps import count_steps
 
 Sides = Literal["both", "front", "back"]
@@ -311,7 +311,9 @@ class SceneQueries:
         """
         return self._built.merged.winding_number(points, tolerance)
 
-    def closest_point(self, points: ArrayLike, max_distance: ArrayLike = np.inf) -> SceneClosestPoints:
+    def closest_point(
+        self, points: ArrayLike, max_distance: ArrayLike = np.inf, *, mask: int | None = None
+    ) -> SceneClosestPoints:
         """Return the nearest point of the surfaces to each point, as ``Octree.closest_point``.
 
         Of equal distances, the lowest object is named, then the lowest instance, then the lowest face.
@@ -320,6 +322,8 @@ class SceneQueries:
         ----------
         points, max_distance
             As for ``Octree.closest_point``.
+        mask : int, optional
+            32 bits: instances count whose mask has one of them too; None for all instances.
 
         Returns
         -------
@@ -336,7 +340,9 @@ class SceneQueries:
         (array(1.), array(1))
         """
         built = self._built
-        return SceneClosestPoints(closest_point(built.tree, built.mesh, points, max_distance, self.threads), built)
+        counted = built.counted(None if mask is None else count_argument("mask", mask, 0, MASK_BITS, " or None"))
+        found = closest_point(built.tree, built.mesh, points, max_distance, self.threads, counted)
+        return SceneClosestPoints(found, built)
 
     def signed_distance(
         self,
@@ -401,10 +407,6 @@ class SceneQueries:
 def _add_errors(
     scene: BuiltScene, hits: Hits | AllHits, rays: RayBatch, rows: NDArray[np.int64] | None, threads: int
 ) -> None:
-    """Set ``hits.t_error``, from the faces that were hit as a mesh of their own."""
-    hit = hits.face >= 0
-    corners = scene.corners(hits.face[hit])
-    own = Mesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
-    faces = np.full(len(hits.face), -1)
-    faces[hit] = np.arange(len(corners))
+    """Set ``hits.t_error``."""
+    own, faces = scene.mesh_of(hits.face)
     hits.t_error = errors_of(own, faces, hits.t, rays, rows, 1.0, threads)

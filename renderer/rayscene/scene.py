@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import replace
-from threading import RLock
 from typing import Any
 from uuid import uuid4
 
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.arguments.arrays import flag_argument, real_argument
+from renderer.arguments.arrays import flag_argument, plain_argument, real_argument
 from renderer.arguments.types import ArrayLike
-from renderer.errors import expect
+from renderer.errors import MeshError, expect
 from renderer.mesh.foreign import TriangleMesh
 from renderer.mesh.load import FilePaths
 from renderer.mesh.mesh import Mesh
@@ -30,14 +30,17 @@ from renderer.rayscene.built import (
     new_records,
 )
 from renderer.rayscene.files import scene_of_files
+from renderer.rayscene.locking import new_lock
 from renderer.rayscene.queries import SceneQueries
+from renderer.rayscene.records import Records
 from renderer.rayscene.store import StoredScene, load_scene, save_scene
 from renderer.rayscene.transforms import as_transforms, place_records
 from renderer.system.threads import checked_threads
-from renderer.trace.instances import FLAGS, HIDDEN, MASK_BITS
+from renderer.trace.instances import FLAGS, HIDDEN
+from renderer.trace.layout import MASK_BITS
 
 # What a copy of a scene has of its own.
-_OWN = ("_lock", "_members", "_instances", "_added", "_count", "_faces", "_next", "_snapshot", "_listed")
+_OWN = ("_lock", "_members", "_records", "_faces", "_next", "_snapshot", "_listed")
 
 
 class RayScene(SceneQueries):
@@ -66,11 +69,10 @@ class RayScene(SceneQueries):
 
     def __init__(self, *, threads: int | None = None) -> None:
         self.threads = checked_threads(threads)
-        self._lock = RLock()
+        self._lock = new_lock()
         self._members: dict[int, Member] = {}
-        # The records of instances, and of those that were added since.
-        self._instances, self._added = new_records(0), list[NDArray[np.float64]]()
-        self._count, self._faces, self._next = 0, 0, 0
+        self._records = Records(Members([]), new_records(0))
+        self._faces, self._next = 0, 0
         # None where the scene, or which members it has, changed since.
         self._snapshot: BuiltScene | None = None
         self._listed: Members | None = None
@@ -164,7 +166,8 @@ class RayScene(SceneQueries):
         expect(isinstance(scene, RayScene), "scene", "a RayScene", type(scene).__name__)
         outer, there = as_transforms(transforms), scene._built
         with self._lock:
-            check_sizes(self._faces + len(outer) * there.count)
+            copies = len(outer)
+            check_sizes(self._records.count + copies * len(there.top.instances), self._faces + copies * there.count)
             made = {m.id: _composed(outer, there.matrices(m)) for m in there.members}
             for m in there.members:
                 place_records(m.row, new_records(len(made[m.id])), made[m.id])  # refused before any is added
@@ -184,27 +187,77 @@ class RayScene(SceneQueries):
         check_mesh(built.tree)
         with self._lock:
             faces = self._faces + len(matrices) * len(built.mesh.faces)
-            check_sizes(faces)
-            member = Member(self._next, name, built, self._count, len(matrices), names)
-            own = new_records(len(matrices))
-            own.view(np.int64)[:, FLAGS] = flags
-            place_records(member.row, own, matrices)
+            check_sizes(self._records.count + len(matrices), faces)
+            member = Member(self._next, name, built, len(matrices), names)
+            self._records.add(member.id, _placed(member, matrices, flags))
             self._members[member.id] = member
-            self._added.append(own)
-            self._count, self._faces, self._next = self._count + len(own), faces, self._next + 1
+            self._faces, self._next = faces, self._next + 1
             self._snapshot = self._listed = None
             return member.id
 
-    def move(self, object: int, transforms: ArrayLike, *, instances: ArrayLike | None = None) -> None:
-        """Place the instances of an object anew. A query that runs meanwhile sees the scene before or after.
+    def add_instances(self, object: int, transforms: ArrayLike, *, mask: ArrayLike = MASK_BITS) -> NDArray[np.int64]:
+        """Place an object some more times. Its instances keep their numbers.
 
         Parameters
         ----------
         object : int
         transforms : array_like, shape (3, 4), (4, 4), (k, 3, 4) or (k, 4, 4)
-            As for ``add``, one for each instance that is moved.
-        instances : array_like of int, shape (k,), optional
-            Which instances; None for all.
+        mask : array_like of int, shape () or (k,), default all bits
+            As for ``add``.
+
+        Returns
+        -------
+        ndarray of int64, shape (k,)
+            The numbers of the new instances, which follow those that the object has.
+
+        Raises
+        ------
+        ValueError
+            As for ``add``; then nothing is added.
+
+        Examples
+        --------
+        >>> from renderer import RayScene
+        >>> from renderer.mesh.shapes import box
+        >>> scene = RayScene()
+        >>> cube = scene.add(box())
+        >>> scene.add_instances(cube, [[1, 0, 0, 5], [0, 1, 0, 0], [0, 0, 1, 0]])
+        array([1])
+        >>> scene.closest_hit([5.5, 0.25, 9], [0, 0, -1]).instance
+        array(1)
+        """
+        expect(transforms is not None, "transforms", "matrices", "None")
+        matrices = as_transforms(transforms)
+        masks, count = _masks(mask, len(matrices)), len(matrices)
+        with self._lock:
+            member = self._member(object)
+            faces = self._faces + count * len(member.built.mesh.faces)
+            check_sizes(self._records.count + count, faces)
+            names = member.names + ("",) * count if member.names else ()
+            self._records.extend(member.id, _placed(member, matrices, masks))
+            self._members[member.id] = replace(member, count=member.count + count, names=names)
+            self._faces, self._snapshot, self._listed = faces, None, None
+            return np.arange(member.count, member.count + count)
+
+    def move(
+        self,
+        object: int | Mapping[int, ArrayLike],
+        transforms: ArrayLike | None = None,
+        *,
+        instances: ArrayLike | None = None,
+    ) -> None:
+        """Place the instances of an object, or of several, anew.
+
+        A query that runs meanwhile sees the scene before or after.
+
+        Parameters
+        ----------
+        object : int, or dict of int to array_like
+            The object; or several, with the transforms of each, that move at once.
+        transforms : array_like, shape (3, 4), (4, 4), (k, 3, 4) or (k, 4, 4)
+            As for ``add``, one for each instance that is moved. None beside a dict.
+        instances : array_like of int or bool, optional
+            Which k instances: their numbers, or a bool for each of the object; None for all.
 
         Raises
         ------
@@ -216,19 +269,33 @@ class RayScene(SceneQueries):
         >>> from renderer import RayScene
         >>> from renderer.mesh.shapes import box
         >>> scene = RayScene()
-        >>> cube = scene.add(box())
-        >>> scene.move(cube, [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 5]])
+        >>> cube, roof = scene.add(box()), scene.add(box((0, 0, 1), (1, 1, 2)))
+        >>> lifted = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 5]]
+        >>> scene.move(roof, lifted)
+        >>> scene.move({cube: lifted, roof: lifted})
         >>> scene.closest_hit([0.5, 0.25, 9], [0, 0, -1]).t
-        array(3.)
+        array(2.)
         """
-        matrices = as_transforms(transforms)
+        several = isinstance(object, Mapping)
+        alone = transforms is None and instances is None
+        expect(alone or not several, "transforms", "None beside a dict, as instances", "matrices or instances")
         with self._lock:
-            member = self._member(object)
-            rows = _rows(instances, member.count)
-            expect(len(matrices) == len(rows), "transforms", f"{len(rows)} matrices", f"{len(matrices)}")
-            own = self._records[member.begin + rows]
-            place_records(member.row, own, matrices)
-            self._writable()[member.begin + rows] = own
+            moves = object.items() if isinstance(object, Mapping) else [(object, transforms)]
+            moved = [self._moved(each, given, instances) for each, given in moves]  # refused before any is moved
+            records = self._writable()
+            for rows, own in moved:
+                records[rows] = own
+
+    def _moved(
+        self, object: int, transforms: ArrayLike | None, instances: ArrayLike | None
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Instances of an object, and their records where they are moved to."""
+        expect(transforms is not None, "transforms", "matrices", "None")
+        matrices, rows = as_transforms(transforms), self._rows_of(object, instances)
+        expect(len(matrices) == len(rows), "transforms", f"{len(rows)} matrices", f"{len(matrices)}")
+        own = self._records.array[rows]
+        place_records(self._member(object).row, own, matrices)
+        return rows, own
 
     def refit(self, object: int, vertices: ArrayLike) -> None:
         """Move the vertices of an object's mesh, as ``Octree.refit`` does; an octree that was added stays as it was.
@@ -241,7 +308,7 @@ class RayScene(SceneQueries):
         Raises
         ------
         MeshError
-            For other arrays; nothing is changed then.
+            For other arrays, or vertices that the instances place too far away; nothing is changed then.
 
         Examples
         --------
@@ -259,9 +326,13 @@ class RayScene(SceneQueries):
             Queries.__init__(octree, *member.built, self.threads)
             octree.refit(vertices)
             refitted = replace(member, built=octree._built)
-            own = self._records[member.begin : member.begin + member.count].copy()
-            place_records(refitted.row, own, matrices_of(member, self._records))
-            self._writable()[member.begin : member.begin + member.count] = own
+            rows = self._rows_of(object, None)
+            own = self._records.array[rows]
+            try:
+                place_records(refitted.row, own, matrices_of(member, own))
+            except ValueError as error:
+                raise MeshError(f"vertices: expected positions that every instance can place; {error}") from None
+            self._writable()[rows] = own
             self._members[object], self._listed = refitted, None
 
     def show(self, object: int, shown: ArrayLike = True, *, instances: ArrayLike | None = None) -> None:
@@ -271,8 +342,8 @@ class RayScene(SceneQueries):
         ----------
         object : int
         shown : array_like of bool, shape () or (k,), default True
-        instances : array_like of int, shape (k,), optional
-            Which instances; None for all.
+        instances : array_like of int or bool, optional
+            Which k instances: their numbers, or a bool for each of the object; None for all.
 
         Raises
         ------
@@ -291,7 +362,7 @@ class RayScene(SceneQueries):
         """
         with self._lock:
             rows = self._rows_of(object, instances)
-            given = np.asarray(shown)
+            given = plain_argument("shown", shown)
             fits = given.dtype == np.bool_ and given.shape in ((), (len(rows),))
             expect(fits, "shown", f"a bool or {len(rows)} bools", f"{given.dtype} of shape {given.shape}")
             flags = self._writable().view(np.int64)[:, FLAGS]
@@ -310,7 +381,7 @@ class RayScene(SceneQueries):
         array([ True])
         """
         with self._lock:
-            return self._records.view(np.int64)[self._rows_of(object, None), FLAGS] & HIDDEN == 0
+            return self._records.array.view(np.int64)[self._rows_of(object, None), FLAGS] & HIDDEN == 0
 
     def mask(self, object: int, mask: ArrayLike, *, instances: ArrayLike | None = None) -> None:
         """Change the masks of instances of an object.
@@ -320,8 +391,8 @@ class RayScene(SceneQueries):
         object : int
         mask : array_like of int, shape () or (k,)
             32 bits, as for ``add``.
-        instances : array_like of int, shape (k,), optional
-            Which instances; None for all.
+        instances : array_like of int or bool, optional
+            Which k instances: their numbers, or a bool for each of the object; None for all.
 
         Raises
         ------
@@ -357,7 +428,7 @@ class RayScene(SceneQueries):
         array([6])
         """
         with self._lock:
-            return self._records.view(np.int64)[self._rows_of(object, None), FLAGS] & MASK_BITS
+            return self._records.array.view(np.int64)[self._rows_of(object, None), FLAGS] & MASK_BITS
 
     def remove(self, object: int) -> None:
         """Take an object out of the scene. The numbers of others stay.
@@ -383,10 +454,8 @@ class RayScene(SceneQueries):
         """
         with self._lock:
             gone = self._members.pop(self._member(object).id)
-            self._instances = np.delete(self._records, np.s_[gone.begin : gone.begin + gone.count], axis=0)
-            for m in [m for m in self._members.values() if m.begin > gone.begin]:
-                self._members[m.id] = replace(m, begin=m.begin - gone.count)
-            self._count, self._faces = self._count - gone.count, self._faces - gone.count * len(gone.built.mesh.faces)
+            self._records.remove(gone.id)
+            self._faces -= gone.count * len(gone.built.mesh.faces)
             self._snapshot = self._listed = None
 
     @property
@@ -622,15 +691,15 @@ class RayScene(SceneQueries):
         return {**kept, "stored": stored}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self._lock = RLock()
+        self._lock = new_lock()
         self._keep(state.pop("stored"))
         vars(self).update(state)
 
     def _keep(self, stored: StoredScene) -> None:
         built = self._snapshot = stored.built
         self._owner, self._next, self._listed = built.owner, stored.next, built.members
-        self._members, self._instances, self._added = {m.id: m for m in built.members}, built.top.instances, []
-        self._count, self._faces = len(self._instances), built.count
+        self._members, self._faces = {m.id: m for m in built.members}, built.count
+        self._records = Records(built.members, built.top.instances)
 
     @property
     def _built(self) -> BuiltScene:
@@ -640,7 +709,8 @@ class RayScene(SceneQueries):
             with self._lock:
                 built = self._snapshot
                 if built is None:
-                    records = self._records
+                    self._records.compact()
+                    records = self._records.array
                     if self._listed is None:
                         self._listed = Members(self._members.values())
                         self._listed.number(records)
@@ -649,29 +719,29 @@ class RayScene(SceneQueries):
         return built
 
     def _member(self, object: int) -> Member:
-        known = isinstance(object, int | np.integer) and object in self._members
-        expect(known, "object", f"one of {str(list(self._members))[:200]}", repr(object))
+        if not (isinstance(object, int | np.integer) and object in self._members):
+            expect(False, "object", f"one of {str(list(self._members))[:200]}", repr(object))
         return self._members[int(object)]
 
     def _rows_of(self, object: int, instances: ArrayLike | None) -> NDArray[np.int64]:
         """The records of instances of an object."""
         member = self._member(object)
-        return member.begin + _rows(instances, member.count)
-
-    @property
-    def _records(self) -> NDArray[np.float64]:
-        """The records of all instances."""
-        if self._added:
-            self._instances, self._added = np.concatenate([self._instances, *self._added]), []
-        return self._instances
+        return self._records.rows(member.id).start + _rows(instances, member.count)
 
     def _writable(self) -> NDArray[np.float64]:
         """The records of all instances, to be changed: not those that a snapshot has."""
-        records = self._records
-        if self._snapshot is not None and records is self._snapshot.top.instances:
-            records = self._instances = records.copy()
+        if self._snapshot is not None and self._records.array is self._snapshot.top.instances:
+            self._records.array = self._records.array.copy()
         self._snapshot = None
-        return records
+        return self._records.array
+
+
+def _placed(member: Member, matrices: NDArray[np.float64], flags: NDArray[np.int64]) -> NDArray[np.float64]:
+    """The records of new instances."""
+    own = new_records(len(matrices))
+    own.view(np.int64)[:, FLAGS] = flags
+    place_records(member.row, own, matrices)
+    return own
 
 
 def _composed(outer: NDArray[np.float64], inner: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -694,9 +764,11 @@ def _masks(mask: ArrayLike, count: int) -> NDArray[np.int64]:
 def _rows(instances: ArrayLike | None, count: int) -> NDArray[np.int64]:
     if instances is None:
         return np.arange(count)
-    rows = real_argument("instances", instances).reshape(-1)
-    if rows.dtype == np.bool_ and len(rows) == count:
-        rows = np.flatnonzero(rows)
+    rows = plain_argument("instances", instances)
+    if rows.dtype == np.bool_:
+        expect(rows.shape == (count,), "instances", f"{count} bools, or integers", f"bools of shape {rows.shape}")
+        return np.flatnonzero(rows)
+    rows = real_argument("instances", rows).reshape(-1)
     rows = rows if len(rows) else rows.astype(np.int64)
     fits = rows.dtype.kind in "iu" and ((rows >= 0) & (rows < count)).all() and len(np.unique(rows)) == len(rows)
     expect(bool(fits), "instances", f"different integers from 0 to {count - 1}", rows.tolist()[:10])

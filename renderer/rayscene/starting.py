@@ -7,15 +7,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.arguments.arrays import real_argument
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
-from renderer.mesh.mesh import Mesh
 from renderer.rayscene.built import BuiltScene
 from renderer.rayscene.hits import SceneHits, ScenePassage
 from renderer.results.hits import Hits, Passage
 from renderer.trace.batch import NO_STARTS, RayBatch, check_rays, offset_origins, whole_numbers
 from renderer.trace.batch import Leaving as StartsOn
-from renderer.trace.instances import FLAGS, MASK_BITS
+from renderer.trace.instances import FLAGS
+from renderer.trace.layout import MASK_BITS
 from renderer.trace.leaving import check_leaving, shapes_of_starts
 from renderer.trace.starts.record import ALL, FACE, HEAD, IGNORED, MASK, ROW, ROW_STEP
 
@@ -39,7 +40,7 @@ def rays_of(
     expect(plain, "faces", "'both' with leaving", repr(choice.faces))
     leaving, ignored = _on_faces(scene, choice.leaving), _ignored(scene, choice.ignore)
     shapes = shapes_of_starts(leaving, None) if leaving is not None else {}
-    mask = np.asarray(choice.mask)
+    mask = real_argument("mask", choice.mask)
     shapes |= {"mask": mask.shape, **({} if ignored is None else {"ignore": ignored.shape})}
     rays, shape = check_rays(origins, directions, t_min, t_max, shapes)
     count, masks = rays.number, _masks(mask, shape)
@@ -89,7 +90,7 @@ def _ignored(scene: BuiltScene, ignore: SceneHits | None) -> NDArray[np.float64]
         return None
     expect(isinstance(ignore, SceneHits), "ignore", "hits of a scene", type(ignore).__name__)
     expect(ignore._scene.owner == scene.owner, "ignore", "hits of this scene", "hits of another")
-    begins = {m.id: (m.begin, m.count) for m in scene.members}
+    begins = {m.id: (scene.members.rows(m).start, m.count) for m in scene.members}
     ignored = np.full(ignore.object.shape, -1.0)
     for id_ in np.unique(ignore.object[ignore.object >= 0]).tolist():
         if id_ in begins:
@@ -119,12 +120,8 @@ def _seen_of(
 
 def _leave(scene: BuiltScene, rays: RayBatch, left: StartsOn) -> RayBatch:
     """The rays moved off the faces that they leave."""
-    leaves = left.faces >= 0
-    corners = scene.corners(left.faces[leaves])
-    # The faces that rays leave as a mesh of their own; the kernels look up all others in the scene.
-    faces = np.full(len(left.faces), -1)
-    faces[leaves] = np.arange(len(corners))
-    own = Mesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+    # The kernels need the faces that rays leave as a mesh of their own; all others they look up in the scene.
+    own, faces = scene.mesh_of(left.faces)
     moved = offset_origins(rays, left._replace(faces=faces), own, 1.0, scene.threads)
     _rows(moved)[:, FACE] = left.faces
     return moved

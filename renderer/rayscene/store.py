@@ -19,7 +19,8 @@ from renderer.queryable import Built
 from renderer.rayscene.built import BuiltScene, Member, placement, tree_over
 from renderer.rayscene.transforms import as_transforms
 from renderer.system.files import write_atomically
-from renderer.trace.instances import HIDDEN, MASK_BITS
+from renderer.trace.instances import HIDDEN
+from renderer.trace.layout import MASK_BITS
 from renderer.tree.container import Format, Reader, checked_path, opened, shown, write
 from renderer.tree.store import Stored, read_octree, write_octree
 
@@ -86,12 +87,12 @@ def _read(reader: Reader, threads: int) -> StoredScene:
     entries = _entries(described["objects"], following, count)
     octrees = [_octree(reader, number) for number in range(count)]
     reader.expect_end()
-    members, begin = [], 0
+    members = []
     for entry in entries:
         names = tuple(entry.get("names", ()))
-        members.append(Member(entry["id"], entry["name"], octrees[entry["octree"]], begin, entry["instances"], names))
-        begin += entry["instances"]
-    expect(begin == len(transforms), "objects", f"{len(transforms)} instances in all", begin)
+        members.append(Member(entry["id"], entry["name"], octrees[entry["octree"]], entry["instances"], names))
+    placed = sum(member.count for member in members)
+    expect(placed == len(transforms), "objects", f"{len(transforms)} instances in all", placed)
     return StoredScene(BuiltScene(tree_over(members, transforms, flags, threads), threads), following)
 
 

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from renderer.arguments.arrays import real_argument
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
-from renderer.rayscene.placing import LARGEST, place
+from renderer.rayscene.placing import LARGEST, STEEPEST, place
 from renderer.trace.instances import INSTANCE_WORDS, OBJECT
+from renderer.trace.layout import SCALE
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -37,7 +38,9 @@ def place_records(object_: Ints, records: Floats, matrices: Floats) -> None:
     """Write the records of instances of an object. Raises ``ValueError`` naming one that cannot be placed."""
     bad = _place(object_, records, matrices, 0)
     if bad >= 0:
-        expected = f"matrices that can be inverted, with coordinates up to {LARGEST:.3g}"
+        scale = float(object_.view(np.float64)[SCALE])
+        factors = f"factors of the mesh's lengths from {scale / STEEPEST:.3g} to {scale * STEEPEST:.3g}"
+        expected = f"matrices that can be inverted, with coordinates up to {LARGEST:.3g} and {factors}"
         expect(False, "transforms", expected, f"{matrices[bad].tolist()} for instance {bad}")
 
 

@@ -25,7 +25,7 @@ from renderer.studies.share import ROWS as _ROWS
 from renderer.studies.share import Snapshot, check_directions, check_reach, lengths_of, limits_of, snapshot_of
 from renderer.studies.stand import hits_from_stand
 from renderer.system.terminal import progress_bar
-from renderer.trace.instances import MASK_BITS
+from renderer.trace.layout import MASK_BITS
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -205,7 +205,7 @@ def _beams(surfaces: Queries | Snapshot, origin: ArrayLike, pattern: Pattern | A
     farthest = farthest_of(surfaces._built.tree.scale)
     places, shape = check_points("origin", given[..., :3, 3] if posed else given, farthest)
     count = shape[0] if shape else len(directions)
-    fits = len(shape) < 2 and len(directions) in (1, count)
+    fits = len(shape) < 2 and count > 0 and len(directions) in (1, count)
     expect(fits, "origin", f"a place or pose, or {len(directions)}, of shape (..., 3)", f"shape {given.shape}")
     if posed:
         x, y, z = (part[:, None] for part in directions.T)
@@ -254,7 +254,9 @@ def _each_return(
         on = hit[goes]
         leaving, gone = hits[on].through(), gone[on]
         beams = beams.part(on)._replace(origins=cloud.points[goes])
-        hits = closest(beams.origins, beams.directions, t_max=beams.reach - gone, leaving=leaving)
+        # A hit at the end of the reach may, by rounding, be beyond it.
+        left = np.maximum(beams.reach - gone, 0.0)
+        hits = closest(beams.origins, beams.directions, t_max=left, leaving=leaving)
 
 
 def _cloud(hits: Hits | SceneHits, hit: Integers, beams: _Beams, t: Floats, number: int) -> Scan:

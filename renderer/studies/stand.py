@@ -51,9 +51,9 @@ def _row_at(built: Built | BuiltScene, place: Floats, threads: int) -> Floats:
     row, tree, mesh, near = np.zeros(ROW), built.tree, built.mesh, -1
     row[FACE] = -1.0
     if isinstance(built, BuiltScene):
-        near = int(closest_point(tree, mesh, place[None], np.inf, threads).face[0]) if built.count else -1
-        if near < 0:
+        if not len(mesh.faces):
             return row
+        near = int(closest_point(tree, mesh, place[None], np.inf, threads, built.counted(None)).face[0])
         # The nearest face alone, which is the one that the place is on, if it is on any.
         mesh, tree = Octree.from_mesh(_mesh_with(built, near)[0])._built
     face, code, anchor = (part[0] for part in on_surface(tree, mesh, place[None], np.full(1, -1), threads))
@@ -72,5 +72,5 @@ def _take_side(built: Built | BuiltScene, row: Floats, normal: Floats) -> tuple[
 def _mesh_with(built: Built | BuiltScene, face: int) -> tuple[Mesh, int]:
     """A mesh that has a face, and the face's number in it: of a scene a mesh of that face alone."""
     if isinstance(built, BuiltScene):
-        return Mesh(built.corners(np.array([face]))[0], [[0, 1, 2]]), 0
+        return built.mesh_of(np.array([face]))[0], 0
     return built.mesh, face

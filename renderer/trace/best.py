@@ -49,7 +49,7 @@ def admits_all(tree, w, dz):
 
 
 @inlined
-def may_hit_all(tree, block, mask, ignored):
+def may_hit_all(tree, place, mask, ignored):
     """``Ways.may_hit`` of a mesh."""
     return True
 

@@ -32,7 +32,6 @@ from renderer.numerics.simd import (
     narrow,
     offset,
     pointer,
-    prefetch,
     select,
     splat8,
     store,
@@ -43,10 +42,10 @@ from renderer.trace.intersect import Slabs, enter_boxes, largest_of, make_slab, 
 from renderer.trace.layout import (
     BLOCK_WORDS,
     BLOCKS,
-    CACHE_LINE,
     CHILDREN,
     FACES,
     LEAF_BITS,
+    MASK_BITS,
     NODE_WORDS,
     NODES,
     SCALE,
@@ -65,7 +64,7 @@ from renderer.trace.ray_lanes import (
 from renderer.trace.rays import ray_at
 from renderer.trace.stack_entry import child_of_entry, distance_of, octant_of
 from renderer.trace.starts.record import IGNORED, MASK
-from renderer.trace.stream import END
+from renderer.trace.stream import END, prefetch_block, prefetch_node
 from renderer.trace.ways import Ways
 
 # An object, int64: a tree as in ``layout``; the addresses of its mesh's vertices and faces; and, as float64 in the
@@ -77,7 +76,6 @@ VERTICES, MESH_FACES, MIDDLE, HALF, OBJECT_WORDS = (TREE_WORDS + k for k in (0, 
 MATRIX, INVERSE, PLACE, ROOM, OBJECT, FIRST_FACE, FLAGS, INSTANCE_WORDS = 0, 12, 21, 24, 27, 28, 29, 30
 # The bits of flags: the mask below, whether the matrix mirrors, and whether no ray sees the instance.
 MIRRORS, HIDDEN = 1 << 32, 1 << 33
-MASK_BITS = (1 << 32) - 1
 # A scene, as kernels get it, uint64: addresses of the top's nodes and of the instances; their number; and the sides of
 # faces that rays hit: 0 both, 1 that of the normal, 2 the other.
 TOP_NODES, INSTANCES, INSTANCE_COUNT, FACING, SCENE_WORDS = range(5)
@@ -98,9 +96,9 @@ _SHARED = 24
 
 # The rows of lanes that meshes do not use.
 _INSTANCE, _NODES_AT, _BLOCKS_AT, _MASK, _IGNORED = (row * WIDTH for row in range(11, 16))
-# What the roundings of a placed box may cost, as a share of all that is added: eight roundings of float32.
-_BOX_ROOM, _TINY = np.float32(2.0**-20), np.float32(2.0**-149)
-_LINE = CACHE_LINE // 4
+# What the roundings of a placed box may cost, eight of float32: as a share of all that is added, and of its least
+# number.
+_BOX_ROOM, _TINY = np.float32(2.0**-20), np.float32(2.0**-146)
 
 
 class ScenePointers(NamedTuple):
@@ -129,9 +127,9 @@ class ScenePointers(NamedTuple):
 
 
 @inlined
-def _may_hit(tree, block, mask, ignored):
-    number = block >> NUMBER_BITS
-    return _meets(_instance(tree, number)[1], number, mask, ignored)
+def _may_hit(tree, place, mask, ignored):
+    number = place >> NUMBER_BITS
+    return number == 0 or _meets(_instance(tree, number)[1], number, mask, ignored)
 
 
 @inlined
@@ -524,21 +522,18 @@ def _enter_instance(tree, rays, prepared, r, number):
     object_ = _object(words)
     put_slabs(prepared, r, slabs_within(instance, words, ray, largest_of(ray)))
     store(prepared.integers, _NODES_AT + r, _nodes(object_))
-    store(prepared.integers, _BLOCKS_AT + r, load(object_, BLOCKS))
+    # The address is even: its lowest bit has room for WIDE.
+    store(prepared.integers, _BLOCKS_AT + r, load(object_, BLOCKS) | load(object_, WIDE))
 
 
 @inlined
 def _prefetch(tree, prepared, r, child):
     """Prefetch the record of a ray's next step."""
     if child >= 0:
-        nodes, node = float32_pointer(load(prepared.integers, _NODES_AT + r)), (child & _NUMBER) * NODE_WORDS
-        for line in range(NODE_WORDS // _LINE):
-            prefetch(nodes, node + line * _LINE)
+        prefetch_node(float32_pointer(load(prepared.integers, _NODES_AT + r)), child & _NUMBER)
     else:
-        block = (~child >> LEAF_BITS) & _NUMBER
-        blocks = float32_pointer(load(prepared.integers, _BLOCKS_AT + r))
-        for line in range(3):
-            prefetch(blocks, block * BLOCK_WORDS + line * _LINE)
+        at = load(prepared.integers, _BLOCKS_AT + r)
+        prefetch_block(float32_pointer(at & ~1), (~child >> LEAF_BITS) & _NUMBER, at & 1)
 
 
 @inlined

@@ -27,7 +27,7 @@ from renderer.numerics.simd import (
 )
 from renderer.numerics.vec3 import largest_component
 from renderer.trace.best import FaceHit
-from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, MASK_BITS
 
 # (1 + 2 gamma(3)) in float32, rounded up: the far side of a slab after one subtraction, one product and one rounded
 # reciprocal, against a near side that erred the other way (Ize, Robust BVH Ray Traversal, JCGT 2:2, 2013, sec. 3).
@@ -141,7 +141,7 @@ class Ray(NamedTuple):
     t_min: Any
     slack: Any = 0.0
     leaving: Any = -1.0
-    mask: Any = 4294967295.0
+    mask: Any = float(MASK_BITS)
     ignored: Any = -1.0
 
 

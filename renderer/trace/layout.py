@@ -38,6 +38,9 @@ BLOCK_WORDS = 36
 # are float64, and the bits of its scale.
 NODES, BLOCKS, FACES, BLOCK_COUNT, DEPTH, WIDE, SCALE, TREE_WORDS = range(8)
 
+# All bits of a mask. A ray that has them may hit every instance whose mask is not 0.
+MASK_BITS = (1 << 32) - 1
+
 
 @dataclass(frozen=True, eq=False)
 class Tree:
@@ -79,6 +82,12 @@ class Tree:
     def __reduce__(self) -> tuple[Any, ...]:
         """Copy and pickle without the addresses, which are those of this object's arrays."""
         return _restored, (self.nodes, self.blocks, self.faces, self.depth, self.scale)
+
+
+def root_box(nodes: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The lower and upper corner, (3,), of the box around the octants of the root; inf and -inf if it has none."""
+    rows = nodes[:CHILDREN].reshape(3, 2, 8)
+    return rows[:, 0].min(axis=1).astype(np.float64), rows[:, 1].max(axis=1).astype(np.float64)
 
 
 def _restored(nodes: NDArray[Any], blocks: NDArray[Any], faces: NDArray[np.int32], depth: int, scale: float) -> Tree:

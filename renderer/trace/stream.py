@@ -58,16 +58,18 @@ _LINE = CACHE_LINE // 4
 
 
 @inlined
-def _prefetch_child(tree, child):
-    """Prefetch the record of a ray's next step."""
-    if child >= 0:
-        for line in range(NODE_WORDS // _LINE):
-            prefetch(tree.nodes, child * NODE_WORDS + line * _LINE)
-    else:
-        # A float64 block is twice as long: prefetch every second line; the hardware fetches the next.
-        first = first_block(child) * BLOCK_WORDS
-        for line in range(3):
-            prefetch(tree.blocks, (first + line * _LINE) << tree.wide)
+def prefetch_node(nodes, node):
+    """Prefetch the record of a node."""
+    for line in range(NODE_WORDS // _LINE):
+        prefetch(nodes, node * NODE_WORDS + line * _LINE)
+
+
+@inlined
+def prefetch_block(blocks, block, wide):
+    """Prefetch a block, of float64 where ``wide`` is 1."""
+    # A float64 block is twice as long: prefetch every second line; the hardware fetches the next.
+    for line in range(3):
+        prefetch(blocks, (block * BLOCK_WORDS + line * _LINE) << wide)
 
 
 class Lanes(NamedTuple):
@@ -235,7 +237,10 @@ def resume_in_tree(tree, sources, rays, lanes, r):
     child = child_of_entry(entry)
     store(rays.integers, CHILD + r, child)
     store(rays.integers, TOP + r, top)
-    _prefetch_child(tree, child)
+    if child >= 0:
+        prefetch_node(tree.nodes, child)
+    else:
+        prefetch_block(tree.blocks, first_block(child), tree.wide)
     return child
 
 

@@ -15,7 +15,7 @@ from renderer.mesh.shapes import box, icosphere
 from renderer.trace.batch import check_rays
 
 pytestmark = pytest.mark.judges(
-    "RayScene", "RayScene.add", "RayScene.add_scene", "RayScene.all_hits", "RayScene.any_hit",
+    "RayScene", "RayScene.add", "RayScene.add_instances", "RayScene.add_scene", "RayScene.all_hits", "RayScene.any_hit",
     "RayScene.closest_hit", "RayScene.closest_point", "RayScene.contains", "RayScene.count_hits",
     "RayScene.count_steps", "RayScene.mask", "RayScene.masks", "RayScene.merged", "RayScene.mesh", "RayScene.move",
     "RayScene.name", "RayScene.objects", "RayScene.refit", "RayScene.remove", "RayScene.show", "RayScene.shown",
@@ -225,14 +225,10 @@ def test_a_ray_passes_through_the_instance_that_it_ignores(repeats):
     assert first.instance.tolist() == np.repeat([2, 0, -1], repeats).tolist()
     assert second.instance.tolist() == np.repeat([1, 1, -1], repeats).tolist()
     # From the body itself: a ray into it comes out on the other side unhindered.
-    inward = scene.closest_hit(first.points[first.hit], aims[first.hit], leaving=first_of(scene, origins, aims, first))
+    inward = scene.closest_hit(first.points[first.hit], aims[first.hit], leaving=first[first.hit])
     assert (inward.t == 0).all() or inward.hit.all()
-    free = scene.closest_hit(origins[first.hit], aims[first.hit], ignore=first_of(scene, origins, aims, first))
+    free = scene.closest_hit(origins[first.hit], aims[first.hit], ignore=first[first.hit])
     assert (free.instance == 1).all()
-
-
-def first_of(scene, origins, aims, hits):
-    return scene.closest_hit(origins[hits.hit], aims[hits.hit])
 
 
 @cases("repeats", [1, 10])
@@ -327,6 +323,36 @@ def test_an_empty_scene_is_hit_by_nothing():
         RayScene().contains([0, 0, 0])
 
 
+def test_objects_come_and_go_in_any_order():
+    """Records of those that are gone stay for a while among the others."""
+    rng, scene, octree, places = np.random.default_rng(10), RayScene(), Octree(box()), {}
+    for _ in range(300):
+        if places and rng.random() < 0.45:
+            gone = rng.choice(list(places))
+            del places[gone]
+            scene.remove(gone)
+        else:
+            own = placed(rng, "steps", int(rng.integers(0, 4)))
+            places[scene.add(octree, own)] = own
+        if places and rng.random() < 0.3:
+            moved = int(rng.choice(list(places)))
+            places[moved] = placed(rng, "steps", len(places[moved]))
+            scene.move(moved, places[moved])
+        if places and rng.random() < 0.3:
+            grown = int(rng.choice(list(places)))
+            own = placed(rng, "steps", int(rng.integers(0, 3)))
+            numbers = scene.add_instances(grown, own, mask=1 << 31)
+            assert numbers.tolist() == list(range(len(places[grown]), len(places[grown]) + len(own)))
+            assert (scene.masks(grown)[numbers] == 1 << 31).all()
+            places[grown] = np.concatenate([places[grown], own])
+        if rng.random() < 0.1:
+            scene.any_hit(HERE, DOWN)
+    assert scene.objects == list(places)
+    for object_, own in places.items():
+        np.testing.assert_array_equal(scene.transforms(object_), own)
+    assert_like_merged(scene, 3)
+
+
 def test_an_octree_is_shared_and_a_refit_of_one_object_changes_no_other():
     octree, scene = Octree(box()), RayScene()
     one, other = scene.add(octree), scene.add(octree, [[1, 0, 0, 5], [0, 1, 0, 0], [0, 0, 1, 0]])
@@ -359,6 +385,29 @@ def test_queries_see_the_scene_before_or_after_a_move():
     assert seen and all(found in ({8.0}, {4.0}) for found in seen)
 
 
+def test_several_objects_move_at_once():
+    """Queries see both where they were, or both where they are; refused, none has moved."""
+    scene = RayScene()
+    cubes = [scene.add(box((x, 0, 0), (x + 1, 1, 1))) for x in (0, 3)]
+    origins, ends, seen = [[0.3, 0.4, 9.0], [3.3, 0.4, 9.0]], threading.Event(), set()
+    low, high = np.eye(4), np.eye(4) + np.outer([0, 0, 1, 0], [0, 0, 0, 4])
+
+    def query():
+        while not ends.is_set():
+            seen.add(tuple(scene.closest_hit(origins, [0, 0, -1]).t.tolist()))
+
+    thread = threading.Thread(target=query)
+    thread.start()
+    for k in range(200):
+        scene.move(dict.fromkeys(cubes, high if k % 2 else low))
+    ends.set()
+    thread.join()
+    assert seen <= {(8.0, 8.0), (4.0, 4.0)}
+    with pytest.raises(ValueError, match="transforms: expected 1 matrices, got 2"):
+        scene.move({cubes[0]: low, cubes[1]: [low, low]})
+    assert scene.closest_hit(origins, [0, 0, -1]).t.tolist() == [4, 4]
+
+
 def test_inside_and_distance_of_closed_parts_that_overlap():
     scene = RayScene()
     scene.add(box(), [[[2, 0, 0, 0], [0, 2, 0, 0], [0, 0, -2, 2]], [[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1]]])
@@ -368,6 +417,65 @@ def test_inside_and_distance_of_closed_parts_that_overlap():
     assert scene.signed_distance(points).tolist() == [-0.5, -0.5, 0.0, 1.0]
     assert scene.visible([5, 1, 1], [[2, 1, 1], [-1, 1, 1]]).tolist() == [True, False]
     assert (scene.count_steps([[1, 1, 9]], [0, 0, -1]).nodes > 0).all()
+
+
+@cases("factors", [[1, 1, 2.0**119], [2.0**-119] * 3, [1.0, 2.0**-119, 1.0]])
+def test_factors_that_float32_holds_have_the_bits_of_the_merged_mesh_and_others_are_refused(factors):
+    """Boxes were NaN beyond it, and small ones were passed: queries missed what is there."""
+    flat, scene = Mesh(box().vertices[:4] * [1, 1, 0], [[0, 1, 2], [1, 3, 2], [0, 2, 1]]), RayScene()
+    places = np.zeros((20, 3, 4))
+    places[:, :, :3], places[:, :, 3] = np.diag(factors), np.random.default_rng(4).uniform(-4, 4, (20, 3))
+    places[:, :, 3] *= np.minimum(factors, 1)
+    scene.add(flat, places)
+    assert_like_merged(scene, 1)
+    places[7, :, :3] = np.diag(np.square(factors))
+    with pytest.raises(ValueError, match=r"transforms: .* factors of the mesh's lengths from .* for instance 7"):
+        scene.move(0, places)
+
+
+@cases(
+    ("meshes", "inside"),
+    [
+        ([box(), Mesh(box().vertices, box().faces[:, ::-1])], None),
+        ([box(), Mesh(box().vertices * 2, box().faces[:, ::-1])], False),
+        ([Mesh(box().vertices, box().faces[:, ::-1])], True),
+        ([box(), Mesh(np.empty((0, 3)), np.empty((0, 3), int))], True),
+    ],
+)
+def test_closed_parts_have_an_inside_unless_they_cancel(meshes, inside):
+    """As of the merged mesh, which counts only what is shown."""
+    scene = RayScene()
+    for mesh in meshes:
+        scene.add(mesh)
+    scene.show(scene.add(box()), False)
+    merged, point = Octree(scene.merged), [0.25, 0.25, 0.25]
+    if inside is None:
+        for query in (merged.contains, scene.contains, scene.signed_distance):
+            with pytest.raises(ValueError, match="got 24 faces, each as often one way round as the other"):
+                query(point)
+    else:
+        assert scene.contains(point) == merged.contains(point) == inside
+        assert scene.signed_distance(point) == merged.signed_distance(point)
+
+
+@cases("mask", [None, 1, 2, 6, 8])
+def test_the_nearest_point_is_that_of_what_a_mask_chooses(mask):
+    """As of a scene of those alone, from many points, and from one whose products float64 loses."""
+    rng, scene, alone, masks = np.random.default_rng(9), RayScene(), RayScene(), np.arange(12) % 4
+    places = np.concatenate([placed(rng, "turned", 8), np.tile(np.eye(4)[:3], (4, 1, 1))])
+    scene.add(box(), places, mask=masks)
+    scene.show(0, False, instances=[0, 5])
+    chosen = np.flatnonzero([scene.shown(0)[k] and (mask is None or masks[k] & mask) for k in range(12)])
+    alone.add(box(), places[chosen])
+    for points in (rng.normal(size=(2000, 3)) * 3, [[0.5, 0.25, 1e-300]]):
+        ours = scene.closest_point(points, mask=mask)
+        if not len(chosen):
+            assert (ours.distance == np.inf).all() and (ours.object == -1).all() and np.isnan(ours.u).all()
+            continue
+        theirs = alone.closest_point(points)
+        np.testing.assert_array_equal(ours.distance, theirs.distance)
+        np.testing.assert_array_equal(ours.instance, chosen[theirs.instance])
+        np.testing.assert_array_equal(ours.face, theirs.face)
 
 
 def crushed():
@@ -417,6 +525,17 @@ FAULTS = {
     "faces: expected 'both' with leaving": lambda s: s.any_hit(
         HERE, DOWN, leaving=s.closest_hit(HERE, DOWN), faces="front"
     ),
+    "instances: expected 1 bools, or integers, got bools of shape .2,.": lambda s: s.show(0, instances=[True, False]),
+    "shown: expected an array, got rows of different lengths": lambda s: s.show(0, [[True], [True, False]]),
+    "mask: expected an array, got rows of different lengths": lambda s: s.any_hit(HERE, DOWN, mask=[[1], [1, 2]]),
+    "transforms: expected None beside a dict": lambda s: s.move({0: np.eye(4)}, np.eye(4)),
+    "object: expected one of .0., got 5": lambda s: s.move({0: np.eye(4) * [2, 2, 2, 1], 5: np.eye(4)}),
+    "transforms: expected matrices that can be inverted.* for instance 0": lambda s: s.add_instances(
+        0, np.zeros((3, 4))
+    ),
+    "mask: expected an integer from 0 to 4294967295 or None, got .1.": lambda s: s.closest_point(HERE, mask=[1]),
+    "transforms: expected matrices, got None": lambda s: s.move(0, None),
+    "vertices: expected positions that every instance can place": lambda s: s.refit(0, box().vertices * 1e30),
     "values: expected objects of the scene": lambda s: s.closest_hit(HERE, DOWN).interpolate({5: range(12)}),
 }
 
@@ -437,6 +556,26 @@ def test_values_of_one_object_are_not_taken_for_those_of_others():
     scene.add(box())
     with pytest.raises(ValueError, match="values: expected a dict of object"):
         scene.closest_hit(HERE, DOWN).take(range(12))
+
+
+def test_instances_are_chosen_by_number_or_by_a_bool_for_each():
+    scene, lifted = RayScene(), np.eye(4) + np.outer([0, 0, 1, 0], [0, 0, 0, 5])
+    scene.add(box(), [np.eye(4)] * 3)
+    scene.move(0, [lifted, lifted], instances=np.array([True, False, True]))
+    assert scene.transforms(0)[:, 2, 3].tolist() == [5, 0, 5]
+    scene.show(0, False, instances=[False, True, False])
+    assert scene.shown(0).tolist() == [True, False, True]
+
+
+def test_hits_print_as_what_they_are():
+    """Not as an object at an address."""
+    scene = another()
+    assert repr(scene.closest_hit(HERE, DOWN)) == (
+        "SceneHits(t=array(8.), side=array(1), t_error=None, object=array(0), instance=array(0), face=array(10), "
+        "u=array(0.25), v=array(0.25))"
+    )
+    assert repr(scene.all_hits(HERE, DOWN)).startswith("SceneAllHits(offsets=array([0, 2]), t=array([8., 9.]), ")
+    assert repr(scene.closest_point(HERE)).startswith("SceneClosestPoints(distance=array(8.), object=array(0), ")
 
 
 def test_a_mesh_that_cannot_be_used_is_refused():

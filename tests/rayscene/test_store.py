@@ -80,7 +80,7 @@ def state(scene: RayScene) -> tuple[Any, ...]:
 def changed(scene: RayScene) -> RayScene:
     """The scene after each kind of change."""
     first = scene.objects[0]
-    scene.move(first, transforms(1, 7), instances=[1])
+    scene.move(first, scene.transforms(first)[:1] * 0.75, instances=[1])
     scene.refit(first, scene.mesh(first).vertices * [1, 0.5, 2])
     scene.show(first, False)
     scene.show(first, True)
@@ -137,7 +137,7 @@ def test_instances_follow_an_object_that_gets_another_place() -> None:
     scene = crowd()
     words = scene._built.top.instances.view(np.int64)
     for m in scene._built.members:
-        assert (words[m.begin : m.begin + m.count, OBJECT] == m.row.ctypes.data).all()
+        assert (words[scene._built.members.rows(m), OBJECT] == m.row.ctypes.data).all()
 
 
 # --- once each --------------------------------------------------------------------------------------------------
@@ -168,6 +168,19 @@ def test_a_map_is_viewed_and_not_copied(path: Path) -> None:
                     array = array.base
                 owners.add(array)
     assert len(owners) == 1
+
+
+def test_more_instances_than_a_scene_can_number_are_refused(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The products that say where their blocks are left int64."""
+    scene = RayScene()
+    scene.add(box(), transforms(3))
+    scene.save(path)
+    monkeypatch.setattr("renderer.rayscene.built.MOST_INSTANCES", 5)
+    for add in (lambda: scene.add(box(), transforms(3)), lambda: scene.add_scene(scene, transforms(1))):
+        with pytest.raises(ValueError, match="scene: expected at most 5 instances, got 6"):
+            add()
+    monkeypatch.setattr("renderer.rayscene.built.MOST_INSTANCES", 2)
+    assert refusal(path).startswith("scene: expected at most 2 instances, got 3")
 
 
 # --- files that are none ----------------------------------------------------------------------------------------
@@ -314,7 +327,7 @@ def placed(at: tuple[int, ...], value: float) -> dict[str, NDArray[Any]]:
     return {"transforms": matrices}
 
 
-_PLACED = "transforms: expected matrices that can be inverted, with coordinates up to 1.15e+18, got "
+_PLACED = "transforms: expected matrices that can be inverted, with coordinates up to 1.15e+18 and factors of "
 
 
 ARRAYS: dict[str, tuple[dict[str, NDArray[Any]], str]] = {

@@ -133,6 +133,21 @@ def test_through_parallel_panes_the_distances_and_cosines_are_those_of_trigonome
     np.testing.assert_array_equal(np.bincount(near.rays, minlength=30), (slanted[:, :2] <= 3.0).sum(axis=1))
 
 
+def test_a_ray_ends_at_a_pane_that_rounding_puts_beyond_its_reach() -> None:
+    """The way that was left was less than nothing."""
+    reach, first, last = 1.5102433809840485, 0.008263817764264547, 1.5102433809840488
+    assert first + (reach - first) > reach
+    scene, corner = panes([first, last, 5.0]), [-200.0, -200.0, 0.0]  # behind corners a ray starts exactly there
+    cloud = scan(scene, corner, [[0, 0, 1]], returns=3, through=[0, 1, 2], max_distance=reach)
+    assert cloud.objects.tolist() == [0, 1]
+
+
+def test_a_scanner_where_something_is_hidden_stands_in_the_air() -> None:
+    scene = RayScene()
+    scene.show(scene.add(box()), False)
+    assert len(scan(scene, [0.5, 0.5, 1.0], 100).rays) == 0
+
+
 @cases("kind", [Octree, BruteForce])
 def test_an_octree_is_an_object_that_light_may_go_through(kind: Callable[..., Any]) -> None:
     octree = kind(icosphere(2))
@@ -224,6 +239,10 @@ POSE = np.eye(4)[:3]
         ({"through": [1, 7]}, r"through: expected some of the objects \[0, 1, 2, 3\], got \[7\]"),
         ({"origin": POSE.T}, r"origin: expected a place or pose, or 5, of shape \(\.\.\., 3\), got shape \(4, 3\)"),
         ({"origin": np.tile(POSE, (3, 1, 1))}, r"origin: expected a place or pose, or 5, .*got shape \(3, 3, 4\)"),
+        (
+            {"origin": np.empty((0, 3)), "pattern": [[0, 0, 1]]},
+            r"origin: expected a place or pose, or 1, .*got shape \(0, 3\)",
+        ),
         ({"origin": np.ones((4, 4))}, "origin: expected poses whose last row is 0 0 0 1"),
         ({"origin": 0.0 * POSE}, r"origin: expected finite, non-zero vectors.* got \[0.0, 0.0, 0.0\] in row 0"),
         ({"origin": np.zeros((5, 3)), "normal": [0, 0, 1]}, "normal: expected None where the scanner moves"),

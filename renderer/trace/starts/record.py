@@ -7,6 +7,7 @@ import numpy as np
 from renderer.jit.decorators import inlined
 from renderer.numerics.simd import address, float64_pointer, int32_pointer, load, offset, pointer
 from renderer.numerics.vec3 import row3, scale, three
+from renderer.trace.layout import MASK_BITS
 
 # The head of an array of starts, int64: the float64 of a row that each ray is after the one before, 0 where no ray
 # starts on the surface; and the addresses of the mesh's vertices and faces.
@@ -17,7 +18,7 @@ ROW_STEP, VERTICES, FACES, HEAD = 0, 1, 2, 8
 # is on the side where the ray starts. Then mask and instance ignored, as of ``intersect.Ray``.
 SLACK, FACE, CODE, ANCHOR, PILE, WAY, MASK, IGNORED, ROW = 0, 1, 2, 3, 5, 6, 9, 10, 11
 # The mask of a ray that may hit every instance.
-ALL = float((1 << 32) - 1)
+ALL = float(MASK_BITS)
 # The slack of a ray that no search takes as it is: ``search.search_from`` decides.
 EDGE = np.inf
 # The bits of a code: the side of the face that the ray starts on is known, and is that of its normal; the ray came

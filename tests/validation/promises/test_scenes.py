@@ -71,7 +71,7 @@ def test_instances_that_stay_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_change_in_the_records_that_hits_have_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(RayScene, "_writable", lambda scene: scene._instances)
+    monkeypatch.setattr(RayScene, "_writable", lambda scene: scene._records.array)
     assert "hits keep the scene that they hit" in broken("moments")
 
 

@@ -8,10 +8,10 @@ from validation.defects.seeded.defect import Defect
 
 
 def _write_in_place(sound: Any, scene: Any) -> Any:
-    return scene._instances
+    return scene._records.array
 
 
-def _move_all_or_none(sound: Any, scene: Any, object: Any, transforms: Any, *, instances: Any = None) -> Any:
+def _move_all_or_none(sound: Any, scene: Any, object: Any, transforms: Any = None, *, instances: Any = None) -> Any:
     return sound(scene, object, transforms) if instances is None else None
 
 
