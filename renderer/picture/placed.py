@@ -19,7 +19,7 @@ from renderer.scene.instance import Instance
 from renderer.scene.needs import Features
 from renderer.scene.scene import Scene
 from renderer.shade.surface import SceneArrays
-from renderer.trace.instances import MASK_BITS
+from renderer.trace.layout import MASK_BITS
 
 # The least number of faces that copies add. Of fewer, the merged mesh is small: 200 bytes a face with its tree.
 _LEAST = 1 << 14
@@ -38,7 +38,7 @@ def placed(scene: Scene, split: Literal["midpoint", "sah"], threads: int) -> Bui
     members, transforms = list[Member](), list[NDArray[np.float64]]()
     for mesh, matrices in stands:
         own = Built(mesh, trees[id(mesh)])
-        members.append(Member(len(members), "", own, len(transforms), len(matrices)))
+        members.append(Member(len(members), "", own, len(matrices)))
         transforms += matrices
     flags = np.full(len(transforms), MASK_BITS)
     try:

@@ -41,5 +41,6 @@ def _slots(tree: Tree | SceneTree) -> Iterator[tuple[int, int]]:
         yield 0, len(tree.faces)
         return
     for member in tree.members:
-        for number in range(member.begin + 1, member.begin + member.count + 1):
+        rows = tree.members.rows(member)
+        for number in range(rows.start + 1, rows.stop + 1):
             yield number << SLOT_BITS, len(member.built.tree.faces)
