@@ -150,8 +150,7 @@ def test_a_mesh_keeps_colours_that_others_have_not(tmp_path: Path) -> None:
     (tmp_path / "a.glb").write_bytes(glb.file(meshes=meshes, nodes=[{"mesh": 0}, {"mesh": 1}]))
     scene = RayScene.from_files(tmp_path / "a.glb")
     assert [scene.mesh(k).colors is not None for k in scene.objects] == [True, False]
-    with pytest.warns(RepairWarning, match="left out, as only some primitives have them: colors"):
-        load_mesh(tmp_path / "a.glb")
+    assert load_mesh(tmp_path / "a.glb").colors.tolist() == [[1, 0, 0]] * 3 + [[1, 1, 1]] * 3
 
 
 @pytest.mark.filterwarnings("ignore:.*points and lines")
@@ -170,10 +169,10 @@ def test_what_is_left_out_is_named_with_the_file(tmp_path: Path) -> None:
     glb = Glb()
     meshes = shapes(glb)
     meshes[0]["primitives"].append({**meshes[0]["primitives"][0], "mode": 1})
-    (tmp_path / "a.glb").write_bytes(glb.file(meshes=meshes, nodes=[{"mesh": 0}], materials=[{}]))
+    (tmp_path / "a.glb").write_bytes(glb.file(meshes=meshes, nodes=[{"mesh": 0}], cameras=[{}]))
     with pytest.warns(RepairWarning) as said:
         RayScene.from_files(tmp_path / "a.glb")
-    left_out = "left out, as they have no surface: points and lines; left out: materials"
+    left_out = "left out, as they have no surface: points and lines; left out: cameras"
     assert [str(one.message) for one in said] == [f"{tmp_path / 'a.glb'}: {left_out}"]
 
 
