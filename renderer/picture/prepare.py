@@ -76,7 +76,7 @@ class PreparedScene:
         --------
         >>> from renderer import load_scene, prepare
         >>> len(prepare(load_scene("scenes/stairs.toml")).mesh.faces)
-        26
+        46
         """
         return self.octree.mesh
 
@@ -87,8 +87,8 @@ class PreparedScene:
         Examples
         --------
         >>> from renderer import load_scene, prepare
-        >>> prepare(load_scene("scenes/glass.toml")).octree.closest_hit([0, 9, 0], [0, -1, 0]).hit
-        array(True)
+        >>> prepare(load_scene("scenes/glass.toml")).octree.closest_hit([[0, 9, 0]], [0, -1, 0]).hit
+        array([ True])
         """
         return self.built.merged if isinstance(self.built, BuiltScene) else self.built
 

@@ -38,7 +38,7 @@ class Instance:
 
     def __post_init__(self) -> None:
         middle, reach = self._box
-        if not (np.abs(middle) + reach < _FARTHEST).all():
+        if not (np.maximum(np.abs(middle), reach) < _FARTHEST).all():
             _ = self.mesh  # which raises for what float64 cannot hold
 
     @lazy

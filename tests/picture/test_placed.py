@@ -13,7 +13,7 @@ from renderer.picture.image import PLANES
 from renderer.rayscene.built import BuiltScene
 from tests.cases import cases
 
-pytestmark = pytest.mark.judges("SceneObject", "prepare", "render")
+pytestmark = pytest.mark.judges("PreparedScene.mesh", "PreparedScene.octree", "SceneObject", "prepare", "render")
 
 BALL = icosphere(2)
 # Its normals are not those of its faces.

@@ -116,6 +116,8 @@ def things() -> dict[str, Any]:
         "a scene not yet placed": scene((BALL, "grey", "flat"), floor=FLOOR), "floor": FLOOR, "settings": FLAT,
         "sky": Sky(sun=(0, -1, 0), sun_lights=2),
         "object": MIXED.objects[0], "light": MIXED.lights[0], "point light": PointLight(position=(0, 1, 2)),
+        **{f"camera {k}": camera for k, camera in enumerate(CAMERAS)}, "image of a texture": TEXTURE.image,
+        "texture": TEXTURE, "material of a file": renderer.MeshMaterial("wood", base_color_texture=TEXTURE),
         "camera": EYE, "parallel camera": OrthographicCamera(eye=(0, 0, 6), target=(0, 0, 0), height=3),
         **{f"material {name}": material for name, material in MIXED.materials.items()}, "image": image,
         "pattern": studies.tregenza(), "places": studies.face_points(BALL), "study": Study("sky", {"patches": 9}),
@@ -129,6 +131,14 @@ def things() -> dict[str, Any]:
     return found
 
 
+TEXTURE = renderer.Texture(np.eye(2))
+_PLACE = {"eye": (0, 0, 6), "target": (0, 0, 0)}
+_FILM = {"width": 8, "height": 6, "fx": 5, "fy": 5}
+CAMERAS = [
+    renderer.PinholeCamera(**_PLACE, **_FILM), renderer.OpenCVFisheyeCamera(**_PLACE, **_FILM),
+    renderer.FisheyeCamera(**_PLACE), renderer.EquirectangularCamera(**_PLACE),
+    renderer.ThinLensCamera(**_PLACE, aperture=0.1),
+]  # fmt: skip
 THINGS = things()
 WAYS: list[Callable[[Any], Any]] = [copy.copy, copy.deepcopy]
 WAYS += [lambda one, protocol=protocol: pickle.loads(pickle.dumps(one, protocol)) for protocol in (2, 5)]
