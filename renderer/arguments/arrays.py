@@ -2,13 +2,15 @@
 
 from collections.abc import Iterator
 from numbers import Real
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.ma import MaskedArray, getmaskarray
 from numpy.typing import NDArray
 
 from renderer.errors import expect
+
+T = TypeVar("T", bound=np.generic)
 
 # Beyond it float64 skips whole numbers.
 _LARGEST_WHOLE = 2**53
@@ -46,6 +48,12 @@ def plain_argument(argument: str, values: Any) -> NDArray[Any]:
         return plain_array(values)
     except ValueError as error:
         raise ValueError(f"{argument}: {error}") from None
+
+
+def read_only(array: NDArray[T]) -> NDArray[T]:
+    """The array itself, made read-only."""
+    array.flags.writeable = False
+    return array
 
 
 def flag_argument(argument: str, value: object) -> bool:

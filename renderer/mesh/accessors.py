@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +13,11 @@ from renderer.errors import MeshError
 
 _TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+
+
+def data_of(uri: str) -> bytes:
+    """The bytes in a data URI, in base64."""
+    return base64.b64decode(unquote(uri.partition(",")[2]))
 
 
 class Accessors:

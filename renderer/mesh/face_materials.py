@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.arguments.arrays import plain_array
+from renderer.arguments.arrays import plain_argument, read_only
 from renderer.errors import expect
 from renderer.mesh.material import MeshMaterial
 
@@ -25,11 +25,8 @@ def checked_materials(materials: Any, face_materials: Any, faces: int) -> Looks:
         good = isinstance(material, MeshMaterial)
         expect(good, "materials", "a sequence of MeshMaterial", f"{type(material).__name__} in row {row}")
     if face_materials is None:
-        return kept, _locked(np.zeros(faces, np.int32)) if kept else None
-    try:
-        given = plain_array(face_materials)
-    except ValueError as error:
-        raise ValueError(f"face_materials: {error}") from error
+        return kept, read_only(np.zeros(faces, np.int32)) if kept else None
+    given = plain_argument("face_materials", face_materials)
     integers = given.dtype.kind in "iu" or not given.size
     expect(integers, "face_materials", "integers", f"dtype {given.dtype}")
     expect(given.shape == (faces,), "face_materials", f"shape ({faces},), a row a face", given.shape)
@@ -37,7 +34,7 @@ def checked_materials(materials: Any, face_materials: Any, faces: int) -> Looks:
     if outside.any():
         row = int(outside.argmax())
         raise ValueError(f"face_materials: expected -1 to {len(kept) - 1}, got {given[row]} in row {row}")
-    return kept, _locked(np.array(given, np.int32)) if kept else None
+    return kept, read_only(np.array(given, np.int32)) if kept else None
 
 
 def joined_materials(meshes: Sequence[tuple[tuple[MeshMaterial, ...], NDArray[np.int32] | None, int]]) -> Looks:
@@ -48,9 +45,4 @@ def joined_materials(meshes: Sequence[tuple[tuple[MeshMaterial, ...], NDArray[np
         # The last is for -1.
         new = np.array([*(rows.setdefault(material, len(rows)) for material in materials), -1], np.int32)
         found.append(np.full(faces, -1, np.int32) if face_materials is None else new[face_materials])
-    return (tuple(rows), _locked(np.concatenate(found))) if rows else ((), None)
-
-
-def _locked(array: NDArray[np.int32]) -> NDArray[np.int32]:
-    array.flags.writeable = False
-    return array
+    return (tuple(rows), read_only(np.concatenate(found))) if rows else ((), None)

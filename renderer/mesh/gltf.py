@@ -6,7 +6,6 @@ takes minutes for deep nodes, all in silence; pygltflib reads no arrays. The for
 
 from __future__ import annotations
 
-import base64
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -18,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import MeshError
-from renderer.mesh.accessors import Accessors
+from renderer.mesh.accessors import Accessors, data_of
 from renderer.mesh.face_materials import checked_materials
 from renderer.mesh.gltf_materials import Materials
 from renderer.mesh.material import MeshMaterial
@@ -188,8 +187,7 @@ def _buffer(number: int, buffer: dict[str, Any], binary: bytes | None, folder: P
     if uri is None and number == 0 and binary is not None:
         return binary
     if isinstance(uri, str) and uri.startswith("data:"):
-        _, _, data = uri.partition(",")
-        return base64.b64decode(unquote(data))
+        return data_of(uri)
     if not _names_file(uri) or folder is None:
         raise MeshError(f"glTF: expected the bytes of buffer {number}, got {str(uri)[:80]!r}")
     try:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import base64
 from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
 
 from renderer.errors import MeshError
-from renderer.mesh.accessors import Accessors
+from renderer.mesh.accessors import Accessors, data_of
 from renderer.mesh.material import MeshMaterial
 from renderer.mesh.reading import Reading
 from renderer.mesh.texture import Texture, Wrap
@@ -112,7 +111,7 @@ class Materials:
         if uri is None:
             return self._reading.image(TextureImage(self._accessors.content(entry["bufferView"]), name))
         if uri.startswith("data:"):
-            return self._reading.image(TextureImage(base64.b64decode(unquote(uri.partition(",")[2])), name))
+            return self._reading.image(TextureImage(data_of(uri), name))
         return self._reading.image_file(unquote(uri))
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar, overload
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.arguments.arrays import plain_array, real_argument, real_array
+from renderer.arguments.arrays import plain_array, read_only, real_argument, real_array
 from renderer.arguments.types import ArrayLike
 from renderer.errors import MeshError
 from renderer.lazy import lazy
@@ -25,7 +25,6 @@ from renderer.mesh.values import Owner
 
 Float64Array = NDArray[np.float64]
 Int32Array = NDArray[np.int32]
-T = TypeVar("T", bound=np.generic)
 
 # A face's corners are int32, so no vertex beyond this one can be named.
 MAX_VERTICES = 2**31 - 1
@@ -157,12 +156,12 @@ class Mesh:
         object.__setattr__(self, "name", name)
         positions = _real_rows(name, "vertices", vertices, 3, np.float64)
         self._expect_finite("vertices", positions)
-        object.__setattr__(self, "vertices", _read_only(positions))
-        object.__setattr__(self, "faces", _read_only(self._checked_faces(faces)))
+        object.__setattr__(self, "vertices", read_only(positions))
+        object.__setattr__(self, "faces", read_only(self._checked_faces(faces)))
         given = {"normals": normals, "colors": colors, "texcoords": texcoords}
         for attribute, width, dtype in _VERTEX_ATTRIBUTES:
             values = given[attribute]
-            rows = None if values is None else _read_only(_real_rows(name, attribute, values, width, dtype))
+            rows = None if values is None else read_only(_real_rows(name, attribute, values, width, dtype))
             object.__setattr__(self, attribute, rows)
         self._check_attributes()
         try:
@@ -185,7 +184,7 @@ class Mesh:
         mesh = object.__new__(cls)
         for attribute in ("vertices", "faces", *(attribute for attribute, _, _ in _VERTEX_ATTRIBUTES)):
             array = arrays.get(attribute)
-            object.__setattr__(mesh, attribute, None if array is None else _read_only(array))
+            object.__setattr__(mesh, attribute, None if array is None else read_only(array))
         object.__setattr__(mesh, "name", name)
         give_materials(give_parts(mesh, ()), (), None)
         mesh._expect_finite("vertices", mesh.vertices)
@@ -345,8 +344,8 @@ class Mesh:
         (array([0., 0., 0.]), array([1., 2., 3.]))
         """
         if len(self.vertices) == 0:
-            return _read_only(np.full(3, np.inf)), _read_only(np.full(3, -np.inf))
-        return _read_only(self.vertices.min(axis=0)), _read_only(self.vertices.max(axis=0))
+            return read_only(np.full(3, np.inf)), read_only(np.full(3, -np.inf))
+        return read_only(self.vertices.min(axis=0)), read_only(self.vertices.max(axis=0))
 
     @property
     def extent(self) -> Float64Array:
@@ -782,7 +781,7 @@ class Mesh:
             lost = ~np.isfinite(given).all(axis=1)
             if lost.any():
                 given[lost] = cls(positions, indices[kept], name=name).vertex_normals()[lost]
-        repairs = Repairs(*(_read_only(np.flatnonzero(rows).astype(np.int64)) for rows in (~kept, ~finite, kept, lost)))
+        repairs = Repairs(*(read_only(np.flatnonzero(rows).astype(np.int64)) for rows in (~kept, ~finite, kept, lost)))
         mesh = cls(positions, indices[kept], name=name, **attributes)
         try:
             looks = checked_materials(materials, face_materials, len(indices))
@@ -805,7 +804,7 @@ def give_materials(
     kept: NDArray[np.int64] | None = None,
 ) -> Mesh:
     """The mesh with checked materials, while it is being made; ``kept`` are its faces among those that have them."""
-    rows = face_materials if kept is None or face_materials is None else _read_only(face_materials[kept])
+    rows = face_materials if kept is None or face_materials is None else read_only(face_materials[kept])
     object.__setattr__(mesh, "materials", materials)
     object.__setattr__(mesh, "face_materials", rows)
     return mesh
@@ -896,11 +895,6 @@ def _index_rows(name: str, faces: Any) -> NDArray[Any]:
         return np.empty((0, 3), np.int32)
     if array.dtype.kind not in "iu":
         raise _error(name, f"faces: expected integers, got dtype {array.dtype}")
-    return array
-
-
-def _read_only(array: NDArray[T]) -> NDArray[T]:
-    array.flags.writeable = False
     return array
 
 

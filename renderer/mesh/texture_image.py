@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.arguments.arrays import real_array
+from renderer.arguments.arrays import read_only, real_array
 from renderer.arguments.types import ArrayLike
 from renderer.errors import MeshError
 from renderer.lazy import lazy
@@ -155,6 +155,4 @@ class TextureImage:
         if kept.dtype.kind == "f" and not np.isfinite(kept).all():
             row, column = np.argwhere(~np.isfinite(kept))[0][:2].tolist()
             raise self._error(f"expected finite values, got {kept[row, column].tolist()} in row {row}, column {column}")
-        kept = kept.reshape(*kept.shape[:2], -1)
-        kept.flags.writeable = False
-        return kept
+        return read_only(kept.reshape(*kept.shape[:2], -1))
