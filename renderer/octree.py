@@ -28,7 +28,7 @@ MAX_LEAF_SIZE = BLOCK_FACES * MAX_LEAF_BLOCKS
 MAX_DEPTH = 64
 # Boxes are float32, and the products of two of their extents must neither overflow nor vanish. Meshes beyond these
 # sizes are scaled by a power of two, which is exact.
-_SMALLEST, _LARGEST = 2.0**-60, 2.0**60
+SMALLEST, LARGEST = 2.0**-60, 2.0**60
 # t comes from products of two sides of a face and the ray's distance from it. Where the distance is as small as a side,
 # 2^-330 cubed is 2^-990: 2^32 above the least normal number, so that t and barycentrics keep their digits.
 _LEAST_SIDE = 2.0**-330
@@ -523,7 +523,7 @@ def _scaled(mesh: Mesh) -> tuple[NDArray[np.float64], float]:
     It is 1 for all but extreme meshes. Raises ``MeshError`` where float64 cannot hold the scaled vertices exactly.
     """
     largest = float(np.abs(mesh.vertices[mesh.faces]).max(initial=0.0)) if _is_extreme(mesh) else 1.0
-    if largest == 0.0 or _SMALLEST <= largest <= _LARGEST:
+    if largest == 0.0 or SMALLEST <= largest <= LARGEST:
         return mesh.vertices, 1.0
     # Limited so that 2^exponent is a float64, for meshes of denormals.
     exponent = min(-int(np.frexp(largest)[1]), 1000)
@@ -568,7 +568,7 @@ def _least_of(vertices: NDArray[np.float64]) -> float:
 
 
 def _is_extreme(mesh: Mesh) -> bool:
-    """Whether the largest coordinate of any vertex, used or not, is not from _SMALLEST to _LARGEST."""
+    """Whether the largest coordinate of any vertex, used or not, is not from SMALLEST to LARGEST."""
     # Not from mesh.bounds: the least of each column takes thirty times as long as the least of all.
     largest = float(max(mesh.vertices.max(), -mesh.vertices.min())) if len(mesh.vertices) else 1.0
-    return not _SMALLEST <= largest <= _LARGEST
+    return not SMALLEST <= largest <= LARGEST

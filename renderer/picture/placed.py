@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
-from renderer.octree import Octree
+from renderer.octree import SMALLEST, Octree
 from renderer.picture.pack import without_faces
 from renderer.queryable import Built
 from renderer.rayscene.built import BuiltScene, Member, tree_over
@@ -23,8 +23,6 @@ from renderer.trace.layout import MASK_BITS
 
 # The least number of faces that copies add. Of fewer, the merged mesh is small: 200 bytes a face with its tree.
 _LEAST = 1 << 14
-# The least coordinate that may be a picture's largest, as of ``prepare.build_octree``.
-_SMALLEST = 2.0**-60
 _NOT_MOVED = np.eye(3, 4)
 
 
@@ -46,7 +44,7 @@ def placed(scene: Scene, split: Literal["midpoint", "sah"], threads: int) -> Bui
     except ValueError:  # a mesh that a matrix makes flat, or coordinates beyond those of pictures
         return None
     built = BuiltScene(top, threads)
-    usual = all(tree.scale == 1.0 for tree in trees.values()) and np.abs(built.bounds).max() >= _SMALLEST
+    usual = all(tree.scale == 1.0 for tree in trees.values()) and np.abs(built.bounds).max() >= SMALLEST
     return built if usual else None
 
 

@@ -18,7 +18,8 @@ from renderer.numerics.simd import (
     reduce_min,
     store,
 )
-from renderer.numerics.vec3 import cross, dot, scale
+from renderer.numerics.vec3 import cross, dot
+from renderer.octree import LARGEST
 from renderer.trace.instances import (
     DISTANCE_ROOM,
     FIRST_FACE,
@@ -32,6 +33,7 @@ from renderer.trace.instances import (
     OBJECT,
     PLACE,
     ROOM,
+    column_of,
     corners_of_scene_face,
     instance_with,
     place_boxes,
@@ -43,8 +45,6 @@ from renderer.tree.bounds import BOX, FACE
 # The most that the product of a matrix and its inverse may differ from 1. Beyond that a ray turned into the mesh's
 # frame would miss its boxes by more than the width of a face.
 SINGULAR = 2.0**-20
-# The largest coordinate of a scene, as that of a mesh's boxes (``octree``).
-LARGEST = 2.0**60
 # The largest component of a matrix and of its inverse, in units in which the mesh's coordinates are near 1: boxes, and
 # rays turned into the mesh's frame, are float32 and neither overflow nor lose digits.
 STEEPEST = 2.0**120
@@ -82,7 +82,7 @@ def _place_one(matrix, record, words):
     if not 0.0 < largest < np.inf:
         return False
     shrink = 1.0 / power_below(largest)
-    x, y, z = _column(record, 0, shrink), _column(record, 1, shrink), _column(record, 2, shrink)
+    x, y, z = column_of(record, 0, shrink), column_of(record, 1, shrink), column_of(record, 2, shrink)
     a, b, c = cross(y, z), cross(z, x), cross(x, y)
     determinant = dot(x, a)
     if determinant == 0.0:
@@ -93,12 +93,6 @@ def _place_one(matrix, record, words):
     mirrors = np.int64(MIRRORS) if determinant < 0.0 else np.int64(0)
     store(words, FLAGS, (load(words, FLAGS) & ~np.int64(MIRRORS)) | mirrors)
     return _put_room(record, own)
-
-
-@inlined
-def _column(record, j, shrink):
-    m = offset(record, MATRIX + j)
-    return scale((load(m, 0), load(m, 4), load(m, 8)), shrink)
 
 
 @inlined

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from renderer.arguments.arrays import real_argument
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
-from renderer.rayscene.placing import LARGEST, STEEPEST, place
+from renderer.octree import LARGEST
+from renderer.rayscene.placing import STEEPEST, place
 from renderer.trace.instances import INSTANCE_WORDS, OBJECT
 from renderer.trace.layout import SCALE
 

@@ -114,11 +114,6 @@ def look_together(scene, together, d):
 
 
 @inlined
-def _material_of(scene, holders, k):
-    return np.int64(material_of(scene, holder(holders, k, NUMBER)))
-
-
-@inlined
 def _enter(media, count, material, most):
     """Add a medium to ``media`` in place, unless there are ``most``. Returns their number."""
     if count < most:
@@ -176,10 +171,10 @@ def _cross_all(scene, members, media, beyond, memory):
     holders, count, n1 = make_holders(memory), media.count, _innermost_ior(scene, media.rows, media.count)
     for k in range(members):
         if holder(holders, k, PATH) == _ENTERED:
-            count = _enter(beyond, count, _material_of(scene, holders, k), media.limit + SPARE)
+            count = _enter(beyond, count, material_of(scene, holder(holders, k, NUMBER)), media.limit + SPARE)
     for k in range(members):
         if holder(holders, k, PATH) == _LEFT:
-            material, before = _material_of(scene, holders, k), count
+            material, before = material_of(scene, holder(holders, k, NUMBER)), count
             count = _leave(beyond, count, material)
             n1 = load(scene.materials, material + IOR) if count == before else n1
     return Change(n1, _innermost_ior(scene, beyond, count), minimum(count, media.limit))

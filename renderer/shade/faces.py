@@ -7,7 +7,7 @@ from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import power_below
 from renderer.numerics.simd import float64_pointer, load, maximum
 from renderer.numerics.vec3 import add, cross, largest_component, row3, scale
-from renderer.trace.instances import FIRST_FACE, INSTANCE_WORDS, instance_with, placed_corners, placed_face
+from renderer.trace.instances import FIRST_FACE, INSTANCE_WORDS, column_of, instance_with, placed_corners, placed_face
 
 # A face of an instance as one number: the instance, from 1 on, above the bits of the face in its mesh.
 _FACE_BITS = 32
@@ -98,13 +98,8 @@ def _turn_of(matrix, mirrors):
     for k in range(12):
         largest = maximum(largest, abs(load(matrix, k))) if k % 4 != 3 else largest
     shrink = 0.5 / power_below(largest)
-    x, y, z = _column(matrix, 0, shrink), _column(matrix, 1, shrink), _column(matrix, 2, shrink)
+    x, y, z = column_of(matrix, 0, shrink), column_of(matrix, 1, shrink), column_of(matrix, 2, shrink)
     return cross(y, z), cross(z, x), cross(x, y), -1.0 if mirrors else 1.0
-
-
-@inlined
-def _column(matrix, j, shrink):
-    return scale((load(matrix, j), load(matrix, 4 + j), load(matrix, 8 + j)), shrink)
 
 
 @inlined

@@ -174,7 +174,7 @@ def look_at(scene, face, u, v, d):
 @inlined
 def material_of(scene, face):
     """The start of the row of a face's material."""
-    return load(scene.material, scene.ways.row(scene, scene.ways.at(scene, face)))
+    return np.int64(load(scene.material, scene.ways.row(scene, scene.ways.at(scene, face))))
 
 
 class Raised(NamedTuple):

@@ -42,7 +42,7 @@ def mark_touching(descriptor, arrays, begin, end, every, stack, touching):
     tree, scene = tree_pointers(descriptor), scene_pointers(arrays)
     for slot in range(begin, end):
         face = face_in(tree, slot)
-        if face >= 0 and (every or lets_through(scene.materials, np.int64(material_of(scene, face)))):
+        if face >= 0 and (every or lets_through(scene.materials, material_of(scene, face))):
             _mark_touched(tree, scene, slot, face, pointer(stack), pointer(touching))
 
 

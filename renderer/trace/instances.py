@@ -199,6 +199,13 @@ def _swapped(words):
 
 
 @inlined
+def column_of(instance, j, factor):
+    """The j-th column of the linear part of an instance's matrix, times a factor."""
+    m = offset(instance, MATRIX + j)
+    return scale((load(m, 0), load(m, 4), load(m, 8)), factor)
+
+
+@inlined
 def _along(matrix, row, x, y, z):
     """A placed coordinate, in the order of sums of ``Mesh.transformed``."""
     m = offset(matrix, row)
