@@ -15,9 +15,15 @@ Floats = NDArray[np.float64]
 
 def affine_rays(rows: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Origins and unit directions (..., 3) of the rays through film positions ``x`` and ``y`` (...)."""
+    origins, directions = affine_map(rows, x, y)
+    return origins, unit_rows(directions)
+
+
+def affine_map(rows: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Origins and directions (..., 3), not normalised, as the map above has them."""
     x, y = x[..., None], y[..., None]
     # The kernel adds in this order.
-    return rows[0] + (rows[1] * x + rows[2] * y), unit_rows(rows[3] + (rows[4] * x + rows[5] * y))
+    return rows[0] + (rows[1] * x + rows[2] * y), rows[3] + (rows[4] * x + rows[5] * y)
 
 
 def unit_rows(vectors: Floats) -> Floats:

@@ -1,5 +1,6 @@
 """The base of the scene classes: types of fields, checks for unknown and wrong values, and one line per fault."""
 
+import math
 import re
 import warnings
 from collections.abc import Callable, Iterable
@@ -81,6 +82,11 @@ class Fields(BaseModel):
     def _union_member(keys: Keys) -> int | None:
         """The place in ``keys`` of the name of a union's member; see ``first_fault``."""
         return None
+
+
+def in_degrees(field: str, value: float) -> str:
+    """The slip of an angle that looks like radians."""
+    return f"{field}: expected degrees, got {value:.6g}. If these are radians, write {field}={math.degrees(value):.6g}."
 
 
 Stated = ParamSpec("Stated")

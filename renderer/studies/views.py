@@ -14,7 +14,7 @@ from renderer.arguments.points import check_points, farthest_of
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.mesh.mesh import face_normals
-from renderer.numerics.film_rays import affine_rays, along, unit_rows
+from renderer.numerics.film_rays import affine_map, along, unit_rows
 from renderer.queryable import Queries
 from renderer.rayscene.scene import RayScene
 from renderer.results.hits import points_on
@@ -203,11 +203,11 @@ def _rays_of(camera: Any, width: int, height: int) -> Callable[[Floats, Floats],
 
 
 def _affine(rows: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    ways = rows[3] + (rows[4] * x[..., None] + rows[5] * y[..., None])
+    origins, ways = affine_map(rows, x, y)
     good = np.isfinite(ways).all(axis=-1) & ways.any(axis=-1)
     if not good.all():
         expect(False, "camera", "rows with finite, non-zero directions", f"{ways[~good][0].tolist()}")
-    return affine_rays(rows, x, y)
+    return origins, unit_rows(ways)
 
 
 def _axis_of(camera: Any, width: int, height: int) -> Floats:

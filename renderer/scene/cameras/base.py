@@ -20,6 +20,7 @@ from renderer.arguments.points import check_points
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.numerics.film_rays import affine_rays, along, unit_rows
+from renderer.scene.cameras.intrinsics import Intrinsics
 from renderer.scene.fields import Fields, FiniteVector
 from renderer.scene.vectors import unit
 
@@ -276,18 +277,16 @@ class AffineCamera(BaseCamera):
 class CentralCamera(AffineCamera):
     """An affine camera whose rays all start at its eye."""
 
-    def _intrinsics(self, width: int, height: int) -> tuple[float, float, float, float, float]:
-        """fx, fy, cx, cy and skew in pixels of a film of some size."""
+    def _intrinsics(self, width: int, height: int) -> Intrinsics:
+        """Those for a film of some size."""
         raise NotImplementedError
 
     def _film_of(self, points: Floats, width: int, height: int) -> tuple[Floats, Floats]:
         right, up, forward = self.frame()
-        fx, fy, cx, cy, skew = self._intrinsics(width, height)
         away = points - np.asarray(self.eye)
         z = along(away, forward)
         z[~(z > 0.0)] = np.nan
-        down = -along(away, up) / z
-        return fx * (along(away, right) / z) + skew * down + cx, fy * down + cy
+        return self._intrinsics(width, height).film(along(away, right) / z, -along(away, up) / z)
 
 
 class AngularCamera(BaseCamera):

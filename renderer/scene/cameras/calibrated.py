@@ -11,6 +11,7 @@ from renderer.arguments.arrays import real_argument
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.scene.cameras.base import BaseCamera, Floats
+from renderer.scene.cameras.intrinsics import Intrinsics
 
 # Of R R^T from the unit matrix: files keep six digits or more.
 _RIGID = 1e-4
@@ -59,23 +60,23 @@ class CalibratedCamera(BaseCamera):
     def film_size(self) -> tuple[int, int]:
         return self.width, self.height
 
-    def _intrinsics(self, width: int, height: int) -> tuple[float, float, float, float, float]:
-        """fx, fy, cx, cy and skew in pixels of a film of another size and the same shape."""
+    def _intrinsics(self, width: int, height: int) -> Intrinsics:
+        """Those for a film of another size and the same shape."""
         far = abs(width * self.height - height * self.width)
         same = far <= max(self.width, self.height)
         expected = f"{self.width} x {self.height}, the camera's own, or another size of that shape"
         expect(same, "resolution", expected, f"{width} x {height}")
         x, y = width / self.width, height / self.height
-        return self.fx * x, self.fy * y, self.cx * x, self.cy * y, self.skew * x
+        return Intrinsics(self.fx * x, self.fy * y, self.cx * x, self.cy * y, self.skew * x)
 
 
-def opencv_intrinsics(K: ArrayLike) -> tuple[float, float, float, float, float]:
-    """fx, fy, cx, cy and skew of OpenCV's camera matrix (3, 3), which has the first pixel's centre at (0, 0)."""
+def opencv_intrinsics(K: ArrayLike) -> Intrinsics:
+    """The ``Intrinsics`` of OpenCV's camera matrix (3, 3), which has the first pixel's centre at (0, 0)."""
     matrix = real_argument("K", K).astype(np.float64)
     shape = matrix.shape == (3, 3) and matrix[1, 0] == 0.0 and matrix[2].tolist() == [0.0, 0.0, 1.0]
     expect(shape, "K", "[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]", repr(matrix.tolist()))
     (fx, skew, cx), (_, fy, cy), _ = matrix.tolist()
-    return fx, fy, cx + 0.5, cy + 0.5, skew
+    return Intrinsics(fx, fy, cx + 0.5, cy + 0.5, skew)
 
 
 def opencv_extrinsics(R: ArrayLike, t: ArrayLike) -> Floats:

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from renderer.arguments.types import ArrayLike
 from renderer.scene.cameras.base import AngularCamera, Floats
-from renderer.scene.fields import stated
+from renderer.scene.fields import in_degrees, stated
 
 
 def turned_away(angle: Floats, right: Floats, down: Floats) -> Floats:
@@ -68,8 +68,7 @@ class FisheyeCamera(AngularCamera):
 
     def _slips(self) -> Iterable[str]:
         if self.fov < 6.3:  # a full turn in radians
-            degrees = math.degrees(self.fov)
-            yield f"fov: expected degrees, got {self.fov:.6g}. If these are radians, write fov={degrees:.6g}."
+            yield in_degrees("fov", self.fov)
 
     def _directions(self, x: Floats, y: Floats, width: int, height: int) -> Floats:
         right, down = x - width / 2.0, y - height / 2.0

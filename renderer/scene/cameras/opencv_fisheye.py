@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import reduce
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -114,25 +114,20 @@ class OpenCVFisheyeCamera(CalibratedCamera, AngularCamera):
         """
         bent = real_argument("D", D)
         expect(bent.shape in ((4,), (4, 1), (1, 4)), "D", "shape (4,)", f"shape {bent.shape}")
-        fx, fy, cx, cy, skew = opencv_intrinsics(K)
-        film: Any = {"width": width, "height": height, "fx": fx, "fy": fy, "cx": cx, "cy": cy, "skew": skew}
-        film |= zip(("k1", "k2", "k3", "k4"), bent.ravel().tolist(), strict=True)
-        return cls(**film, extrinsics=opencv_extrinsics(R, t))
+        film = opencv_intrinsics(K)._asdict() | dict(zip(("k1", "k2", "k3", "k4"), bent.ravel().tolist(), strict=True))
+        return cls(**film, width=width, height=height, extrinsics=opencv_extrinsics(R, t))
 
     def _directions(self, x: Floats, y: Floats, width: int, height: int) -> Floats:
-        fx, fy, cx, cy, skew = self._intrinsics(width, height)
-        down = (y - cy) / fy
-        right = (x - cx - skew * down) / fx
+        right, down = self._intrinsics(width, height).plane(x, y)
         return turned_away(self._angle(np.hypot(right, down)), right, down)
 
     def _film(self, across: Floats, above: Floats, ahead: Floats, width: int, height: int) -> tuple[Floats, Floats]:
-        fx, fy, cx, cy, skew = self._intrinsics(width, height)
         aside = np.hypot(across, above)
         angle = np.arctan2(aside, ahead)
         share = self._distance(angle)[0] / np.where(aside > 0.0, aside, 1.0)
         unseen = (angle > self._widest()) | ((aside == 0.0) & (ahead <= 0.0))
-        right, down = across * share, -above * share
-        return np.where(unseen, np.nan, fx * right + skew * down + cx), np.where(unseen, np.nan, fy * down + cy)
+        x, y = self._intrinsics(width, height).film(across * share, -above * share)
+        return np.where(unseen, np.nan, x), np.where(unseen, np.nan, y)
 
     def _distance(self, angle: Floats) -> tuple[Floats, Floats]:
         """How far from the principal point a ray at an angle falls, in focal lengths, and its derivative."""

@@ -11,7 +11,8 @@ from pydantic import Field
 
 from renderer.arguments.types import ArrayLike
 from renderer.scene.cameras.base import CentralCamera, Floats
-from renderer.scene.fields import stated
+from renderer.scene.cameras.intrinsics import Intrinsics
+from renderer.scene.fields import in_degrees, stated
 
 
 class PerspectiveCamera(CentralCamera):
@@ -58,12 +59,11 @@ class PerspectiveCamera(CentralCamera):
 
     def _slips(self) -> Iterable[str]:
         if 0.15 < self.fov < 2.0:  # 9 to 114 degrees in radians
-            degrees = math.degrees(self.fov)
-            yield f"fov: expected degrees, got {self.fov:.6g}. If these are radians, write fov={degrees:.6g}."
+            yield in_degrees("fov", self.fov)
 
-    def _intrinsics(self, width: int, height: int) -> tuple[float, float, float, float, float]:
+    def _intrinsics(self, width: int, height: int) -> Intrinsics:
         focal = height / (2.0 * math.tan(math.radians(self.fov) / 2.0))
-        return focal, focal, width / 2.0, height / 2.0, 0.0
+        return Intrinsics(focal, focal, width / 2.0, height / 2.0, 0.0)
 
     def rows(self, width: int, height: int) -> Floats:
         right, up, forward = self.frame()

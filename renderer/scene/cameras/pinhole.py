@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -108,9 +108,8 @@ class PinholeCamera(CalibratedCamera, CentralCamera):
         >>> camera.eye, camera.project([[0, 0, 0], [1, 1, 0]])[0].tolist()
         ((0.0, 0.0, -5.0), [[320.0, 240.0], [420.0, 340.0]])
         """
-        fx, fy, cx, cy, skew = opencv_intrinsics(K)
-        film: Any = {"width": width, "height": height, "fx": fx, "fy": fy, "cx": cx, "cy": cy, "skew": skew}
-        return cls(**film, extrinsics=opencv_extrinsics(R, t))
+        film = opencv_intrinsics(K)._asdict()
+        return cls(**film, width=width, height=height, extrinsics=opencv_extrinsics(R, t))
 
     def rows(self, width: int, height: int) -> Floats:
         right, up, forward = self.frame()

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from renderer.arguments.limits import FARTHEST
 from renderer.arguments.types import ArrayLike
-from renderer.numerics.film_rays import affine_rays, unit_rows
+from renderer.numerics.film_rays import affine_map, affine_rays, unit_rows
 from renderer.scene.cameras.base import Floats
 from renderer.scene.cameras.perspective import PerspectiveCamera
 from renderer.scene.fields import stated
@@ -99,7 +99,7 @@ class ThinLensCamera(PerspectiveCamera):
         # rule: point-on-lens
         on_lens = across * right + above * up
         # The rows' directions reach one unit along the axis.
-        in_focus = (rows[3] + (rows[4] * x[..., None] + rows[5] * y[..., None])) * self._focus_distance()
+        in_focus = affine_map(rows, x, y)[1] * self._focus_distance()
         return rows[0] + on_lens, unit_rows(in_focus - on_lens)
 
 
