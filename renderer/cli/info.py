@@ -34,10 +34,10 @@ def _info(options: argparse.Namespace) -> None:
         material = scene.materials[instance.material]
         normals = "smooth" if instance.smooth else "flat"
         say(
-            f"  {instance.mesh.name or 'mesh':<20} {len(instance.mesh.faces):>9} faces  {normals:<7} "
+            f"  {instance.source.name or 'mesh':<20} {instance.faces:>9} faces  {normals:<7} "
             f"{instance.material} ({material.type})"
         )
-        for own in instance.mesh.materials:
+        for own in instance.source.materials:
             say(f"    {_described(own)}")
     findings = examine(scene)
     if features_of(findings).octree:

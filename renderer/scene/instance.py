@@ -58,6 +58,10 @@ class Instance:
         middle, reach = self._box
         return bool((np.abs(point - middle) <= reach + _ROUNDED * np.abs(point)).all())
 
+    @lazy
+    def _moves(self) -> bool:
+        return not np.array_equal(self.matrix, _IDENTITY)
+
     @property
     def shares_normals(self) -> bool:
         """Whether the source has the normals that the mesh needs, if any: those of others are means in the world."""
@@ -69,14 +73,15 @@ class Instance:
         return len(self.source.faces)
 
     def placed(self) -> Mesh:
-        """The mesh in the world, with split vertices where smooth shading stops at sharp edges; not kept."""
-        moves = not np.array_equal(self.matrix, _IDENTITY)
-        mesh = self.source.transformed(self.matrix) if moves else self.source
+        """The mesh in the world, with split vertices where smooth shading stops at sharp edges; ``mesh`` keeps it."""
+        if "mesh" in self.__dict__:
+            return self.mesh
+        mesh = self.source.transformed(self.matrix) if self._moves else self.source
         return mesh if self.shares_normals or self.crease >= 180.0 else mesh.creased(self.crease)
 
     @lazy
     def mesh(self) -> Mesh:
-        """The mesh in the world: ``placed``, kept."""
+        """``placed``, kept."""
         return self.placed()
 
     @lazy
@@ -87,5 +92,7 @@ class Instance:
     @lazy
     def is_float32(self) -> bool:
         """Whether float32 holds all vertices in the world."""
+        if not self._moves:
+            return self.source.is_float32
         pieces = np.array_split(self.source.vertices, range(_TOGETHER, len(self.source.vertices), _TOGETHER))
         return all(Mesh(piece, _NO_FACES).transformed(self.matrix).is_float32 for piece in pieces)

@@ -133,7 +133,7 @@ def _is_camera(path: Path) -> bool:
 
 def prepare_shown(scene: Scene, path: Path | None = None) -> ShownScene:
     """Prepare ``scene`` and load its kernels. Raises ``ValueError`` for a scene that cannot be shown."""
-    expect(any(len(i.mesh.faces) for i in scene.instances), "scene", "at least one face", "none")
+    expect(any(i.faces for i in scene.instances), "scene", "at least one face", "none")
     threads = available_threads()
     prepared = prepare_scene(scene, _needs(scene), "octree", "midpoint", threads)
     prepared = replace(prepared, arrays=_lit(prepared.arrays, scene, prepared.needs))
