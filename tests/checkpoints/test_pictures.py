@@ -102,6 +102,27 @@ def test_one_body_in_another_is_no_body_of_both() -> None:
     assert len({digest_of_scene(scene, needs_of(scene)) for scene in scenes}) == 2
 
 
+def test_each_change_of_what_stands_in_a_scene_changes_its_digest(glass: Scene) -> None:
+    ball = icosphere(2)
+    up, out = (
+        Mesh(ball.vertices, ball.faces, normals) for normals in ([[0, 1, 0]] * len(ball.vertices), ball.vertices)
+    )
+    holed = Mesh(ball.vertices, ball.faces[1:], ball.vertices)
+    moved = {"translate": (0, 1, 0)}
+    pairs = [
+        [(out, {}), (ball, {})], [(ball, {}), (out, {})], [(out, {}), (out, {})], [(up, {}), (ball, {})],
+        [(holed, {}), (ball, {})], [(out, {}), (ball, moved)], [(out, {}), (ball, {"crease": 20.0})],
+        [(out, {}), (ball, {"normals": "flat"})], [(out, {})], [(out, {}), (ball, {}), (out, {})],
+        [(out, {}), (ball, {}), (ball, {})],
+    ]  # fmt: skip
+    digests = set()
+    for pair in pairs:
+        things = [SceneObject(mesh=mesh, material="glass", **{"normals": "smooth"} | more) for mesh, more in pair]
+        scene = Scene(camera=glass.camera, materials={"glass": Dielectric()}, objects=things)
+        digests.add(digest_of_scene(scene, needs_of(scene)))
+    assert len(digests) == len(pairs)
+
+
 @cases(
     "resolution, samples, rows",
     [((512, 512), 1, 512), ((640, 480), 16, 24), ((16384, 16384), 1, 16), ((16384, 16384), 64, 8), ((9, 3), 1, 3)],

@@ -64,6 +64,10 @@ def test_values_are_those_that_trimesh_reads(written: dict[str, Any]) -> None:
         ("illum 4\nd 1", {"mirror": True}),
         ("illum 9\nd 0.25\nTf 1 0 0", {"transmission": 0.75, "transmission_color": (1, 0, 0)}),
         ("illum 7", {"mirror": True, "transmission": 1.0}),
+        ("illum 6", {"mirror": True, "transmission": 1.0}),
+        ("illum 8", {"mirror": True}),
+        *((f"illum {n}\nd 0.5", {"mirror": True, "transmission": 0.5}) for n in (4, 6, 7)),
+        ("illum 5\nd 0.5", {"mirror": True, "alpha": 0.5, "alpha_mode": "blend"}),
         ("Ps 0\nPcr 0.0\naniso 0", {}),
     ],
 )

@@ -105,6 +105,30 @@ def test_memory_does_not_grow_with_copies():
     assert sizes[1] - sizes[0] < 380 * 3000
 
 
+def test_a_mesh_is_kept_once_where_copies_have_many_faces():
+    ball, twin = icosphere(5), icosphere(5)
+    for meshes, once in (([ball], False), ([ball, twin], False), ([ball, twin, ball], True), ([ball, ball], True)):
+        objects = [SceneObject(mesh=mesh, material="grey", translate=(3 * k, 0, 0)) for k, mesh in enumerate(meshes)]
+        for accelerator in ("auto", "octree"):
+            ready = prepare(scene_of(objects), accelerator=accelerator)
+            assert isinstance(ready.built, BuiltScene) == (once and accelerator == "auto")
+    smooth = [SceneObject(mesh=ball, material="grey", normals="smooth", translate=(3 * k, 0, 0)) for k in range(3)]
+    assert not isinstance(prepare(scene_of(smooth)).built, BuiltScene)
+
+
+def test_all_instances_are_marked_that_may_touch(always):
+    """Of two boxes of glass and one apart, in any order."""
+    cube = box()
+    for apart in range(3):
+        places = [(9, 0, 0) if k == apart else (int(k != (apart + 1) % 3), 0, 0) for k in range(3)]
+        objects = [SceneObject(mesh=cube, material="glass", translate=place) for place in places]
+        # Between the three, so that each is an object of its own.
+        objects = [one for pair in zip(objects, [SceneObject(mesh=BALL, material="grey", translate=(0, 9 + k, 0))
+                                                 for k in range(3)], strict=True) for one in pair][:5]  # fmt: skip
+        marks = prepare(scene_of(objects)).arrays.touching
+        assert marks.tolist() == [int(k % 2 == 0 and k // 2 != apart) for k in range(5)]
+
+
 def test_what_cannot_be_placed_is_merged(always):
     flat = [SceneObject(mesh=BALL, material="grey", scale=(1, 1, size)) for size in (0, 0, 1)]
     assert not isinstance(prepare(scene_of(flat)).built, BuiltScene)

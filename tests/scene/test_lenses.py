@@ -93,11 +93,13 @@ def test_a_calibrated_fisheye_follows_opencvs_polynomial(seed: int) -> None:
         np.testing.assert_allclose(camera.project([x, y, 20])[0], expected, rtol=0, atol=1e-12)
 
 
-def test_a_distortion_that_turns_back_has_an_edge() -> None:
-    """t - t^3 grows up to t = sqrt(1/3), where it is 2/3 of that."""
-    camera = OpenCVFisheyeCamera(width=640, height=480, fx=500, fy=500, k1=-1.0, **LEVEL)
-    edge = math.sqrt(1 / 3)
-    inside, outside = ([320 + 500 * edge * 2 / 3 * (1 + off), 240] for off in (-1e-9, 1e-9))
+@cases("number", [1, 2, 3, 4])
+def test_a_distortion_that_turns_back_has_an_edge(number: int) -> None:
+    """t - t^n grows up to t = n^(-1 / (n - 1)), where it is (n - 1) / n of that."""
+    camera = OpenCVFisheyeCamera(width=640, height=480, fx=500, fy=500, **{f"k{number}": -1.0}, **LEVEL)
+    power = 2 * number + 1
+    edge = power ** (-1 / (power - 1))
+    inside, outside = ([320 + 500 * edge * (power - 1) / power * (1 + off), 240] for off in (-1e-9, 1e-9))
     directions = camera.rays([inside, outside])[1]
     assert math.acos(-directions[0, 2]) == pytest.approx(edge, abs=1e-4) and np.isnan(directions[1]).all()
     assert np.isnan(camera.project([math.tan(edge + 0.01), 0, -1])[0]).all()

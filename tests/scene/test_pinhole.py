@@ -84,7 +84,11 @@ def test_another_size_of_the_same_shape_scales_the_intrinsics() -> None:
     points = np.random.default_rng(1).uniform(-1, 1, (50, 3))
     whole = camera.project(points)[0]
     np.testing.assert_allclose(camera.project(points, (1280, 960))[0], 2 * whole, atol=ROUNDED)
-    # Half of an odd size is rounded to whole pixels.
+    # Half of an odd size is rounded to whole pixels, and each side is scaled by itself.
+    tall = PinholeCamera(**{**FILM, "height": 481}, **PLACE, cx=300.0, cy=250.0, skew=3.0)
+    np.testing.assert_allclose(
+        tall.project(points, (320, 240))[0], tall.project(points)[0] * [320 / 640, 240 / 481], atol=ROUNDED
+    )
     odd = PinholeCamera(**{**FILM, "width": 641}, **PLACE)
     np.testing.assert_allclose(odd.project([0, 0, 0], (320, 240))[0], [160, 120], atol=ROUNDED)
 
