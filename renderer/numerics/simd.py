@@ -144,6 +144,18 @@ def address(typingctx, array):
     return types.int64(array), codegen
 
 
+@intrinsic
+def doubles_between(typingctx, first, second):
+    """How many float64 the ``pointer`` ``second`` is after ``first``."""
+
+    def codegen(context, builder, sig, args):
+        word = context.get_value_type(types.int64)
+        start, end = (builder.ptrtoint(pointer_, word) for pointer_ in args)
+        return builder.ashr(builder.sub(end, start), context.get_constant(types.int64, 3))
+
+    return types.int64(first, second), codegen
+
+
 def _pointer_to(dtype: Any) -> Any:
     """The function that converts an address, an int64, to a ``pointer`` to values of ``dtype``."""
 

@@ -22,6 +22,8 @@ class FaceWays(NamedTuple):
     at        at(scene, face): what the others take for a face
     corners   corners(scene, at): its corners, as tuples
     normals   normals(scene, at): the normals of its corners, of any length
+    texcoords texcoords(scene, at): the texture coordinates u and v of its corners, six numbers
+    tints     tints(scene, at): the colours of its corners
     row       row(scene, at): its row of ``material``, ``smooth`` and ``touching``
     touches   touches(scene, face): whether it may coincide with another, one of which transmits light
     """
@@ -29,6 +31,8 @@ class FaceWays(NamedTuple):
     at: Any
     corners: Any
     normals: Any
+    texcoords: Any
+    tints: Any
     row: Any
     touches: Any
 
@@ -51,11 +55,31 @@ def _normals(scene, face):
 
 
 @inlined
+def _texcoords(scene, face):
+    a, b, c = row3(scene.faces, face)
+    return _pairs(scene.texcoords, a, b, c)
+
+
+@inlined
+def _pairs(texcoords, a, b, c):
+    return (
+        load(texcoords, 2 * a), load(texcoords, 2 * a + 1), load(texcoords, 2 * b), load(texcoords, 2 * b + 1),
+        load(texcoords, 2 * c), load(texcoords, 2 * c + 1),
+    )  # fmt: skip
+
+
+@inlined
+def _tints(scene, face):
+    a, b, c = row3(scene.faces, face)
+    return row3(scene.tints, a), row3(scene.tints, b), row3(scene.tints, c)
+
+
+@inlined
 def _touches(scene, face):
     return load(scene.touching, scene.ways.row(scene, scene.ways.at(scene, face))) != 0
 
 
-MERGED = FaceWays(_face, _corners, _normals, _face, _touches)
+MERGED = FaceWays(_face, _corners, _normals, _texcoords, _tints, _face, _touches)
 
 
 @inlined
@@ -80,6 +104,19 @@ def _placed_normals(scene, at):
         return a, b, c
     turn = _turn_of(of.matrix, of.mirrors)
     return _turned(turn, a), _turned(turn, b), _turned(turn, c)
+
+
+@inlined
+def _placed_texcoords(scene, at):
+    of = placed_face(scene.placed, at >> _FACE_BITS, at & _FACE)
+    return _pairs(float64_pointer(load(scene.texcoords, (at >> _FACE_BITS) - 1)), of.a, of.b, of.c)
+
+
+@inlined
+def _placed_tints(scene, at):
+    of = placed_face(scene.placed, at >> _FACE_BITS, at & _FACE)
+    tints = float64_pointer(load(scene.tints, (at >> _FACE_BITS) - 1))
+    return row3(tints, of.a), row3(tints, of.b), row3(tints, of.c)
 
 
 @inlined
@@ -122,4 +159,6 @@ def _instance_row(scene, at):
     return (at >> _FACE_BITS) - 1
 
 
-PLACED = FaceWays(_place, _placed_corners, _placed_normals, _instance_row, _touches)
+PLACED = FaceWays(
+    _place, _placed_corners, _placed_normals, _placed_texcoords, _placed_tints, _instance_row, _touches
+)

@@ -11,3 +11,16 @@ PHONG, MIRROR, DIELECTRIC, LAMBERT, UNLIT = 0, 1, 2, 3, 4
 # towards the light, a point light its position.
 LIGHT_COLUMNS = 7
 DIRECTIONAL, POINT = 0, 1
+
+# One row per material of a picture with textures, float64: for each of its colours, and for the emission, which only such
+# pictures have, the number of a texture or -1, and whether colours of vertices multiply it; the emission; the textures of
+# normals or -1; the opacity, its texture or -1, and the opacity below which a surface is not there, 0 for none.
+COLORS = (AMBIENT, DIFFUSE, SPECULAR, REFLECTANCE, TRANSMITTANCE)
+EMITTED = len(COLORS)
+EMISSION, NORMAL_MAP, OPACITY, OPACITY_MAP, CUTOFF, MAP_COLUMNS = 12, 15, 16, 17, 18, 19
+
+# One row per texture, float64: the place of its first texel, its size and number of levels, how it goes on beyond its
+# edges along u and v, its filter, its strength, and the rows that move texture coordinates.
+TEXEL, ACROSS, DOWN, LEVELS, WRAP, FILTER, STRENGTH, TRANSFORM, TEXTURE_COLUMNS = 0, 1, 2, 3, 4, 6, 7, 8, 14
+REPEAT, MIRRORED, CLAMP = 0, 1, 2
+NEAREST, LINEAR, MIPMAP = 0, 1, 2

@@ -1,0 +1,224 @@
+"""What textures and colours of vertices make of a material at a point: a row of its own.
+
+Other pictures have kernels without any of this, chosen when they are compiled.
+"""
+
+from typing import Any, NamedTuple
+
+import math
+
+from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.simd import doubles_between, load, store
+from renderer.numerics.vec3 import (
+    add,
+    barycentric,
+    cross,
+    dot,
+    largest_component,
+    length,
+    normalized,
+    put3,
+    scale,
+    sub,
+    three,
+    times,
+)
+from renderer.shade.records import (
+    AMBIENT,
+    COLORS,
+    CUTOFF,
+    EMISSION,
+    EMITTED,
+    MAP_COLUMNS,
+    MATERIAL_COLUMNS,
+    NORMAL_MAP,
+    OPACITY,
+    OPACITY_MAP,
+    STRENGTH,
+    TEXTURE_COLUMNS,
+    TRANSMITTANCE,
+)
+from renderer.shade.texture import texture_at
+
+# A material's row at a point, with the emission behind it.
+OWN_COLUMNS = MATERIAL_COLUMNS + 3
+
+
+class LookWays(NamedTuple):
+    """The kernels by which materials are read.
+
+    row       row(scene, spot, look, width, own): the start of the row that holds for a ``Spot``, seen by a ray of that
+              ``width``, from ``scene.materials`` on; ``own`` has room for OWN_COLUMNS
+    normal    normal(scene, spot, look, width): the shading normal
+    glow      glow(scene, row): the ambient light that a row reflects, and what it emits
+    is_there  is_there(scene, spot): whether no mask leaves out the surface
+    has_holes has_holes(scene): whether there is any mask
+    """
+
+    row: Any
+    normal: Any
+    glow: Any
+    is_there: Any
+    has_holes: Any
+
+
+@inlined
+def _plain_row(scene, spot, look, width, own):
+    return look.material
+
+
+@inlined
+def _plain_normal(scene, spot, look, width):
+    return look.n_s
+
+
+@inlined
+def ambient_light(scene, row):
+    """The ambient light that a row reflects."""
+    return times(three(scene.materials, row + AMBIENT), three(scene.colors, 0))
+
+
+@inlined
+def _always(scene, spot):
+    return True
+
+
+@inlined
+def _never(scene):
+    return False
+
+
+PLAIN = LookWays(_plain_row, _plain_normal, ambient_light, _always, _never)
+
+
+@inlined
+def _maps_of(material):
+    return material // MATERIAL_COLUMNS * MAP_COLUMNS
+
+
+class _Patch(NamedTuple):
+    """Texture coordinates at a point, and the width of what is seen there in their units."""
+
+    u: float
+    v: float
+    width: float
+
+
+@kernel
+def _patch_at(scene, at, u, v, width, double_area):
+    """The ``_Patch`` at barycentrics u, v of a face, of which a ray sees a ``width`` in the world."""
+    u0, v0, u1, v1, u2, v2 = scene.ways.texcoords(scene, at)
+    w = 1.0 - u - v
+    area = abs((u1 - u0) * (v2 - v0) - (u2 - u0) * (v1 - v0))
+    # As wide as a square of the same area.
+    wide = width * math.sqrt(area / double_area) if double_area > 0.0 else 0.0
+    return _Patch(w * u0 + u * u1 + v * u2, w * v0 + u * v1 + v * v2, wide)
+
+
+@inlined
+def _texture(scene, number, patch):
+    return texture_at(scene, number, patch.u, patch.v, patch.width)
+
+
+@inlined
+def _tinted(scene, maps, k, color, patch, tint):
+    """A colour times what the k-th pair of columns of maps names."""
+    texture = load(scene.maps, maps + 2 * k)
+    if texture >= 0.0:
+        r, g, b, _ = _texture(scene, int(texture), patch)
+        color = times(color, (r, g, b))
+    return times(color, tint) if load(scene.maps, maps + 2 * k + 1) != 0.0 else color
+
+
+@inlined
+def _has_tints(scene, maps):
+    tints = False
+    for k in range(EMITTED + 1):
+        tints = tints or load(scene.maps, maps + 2 * k + 1) != 0.0
+    return tints
+
+
+@inlined
+def _opacity(scene, maps, patch):
+    opacity, texture = load(scene.maps, maps + OPACITY), load(scene.maps, maps + OPACITY_MAP)
+    return opacity * _texture(scene, int(texture), patch)[3] if texture >= 0.0 else opacity
+
+
+@kernel
+def _own_row(scene, spot, look, width, own):
+    at, maps = scene.ways.at(scene, spot.face), _maps_of(look.material)
+    patch = _patch_at(scene, at, spot.u, spot.v, width, look.facet.double_area)
+    tint = (1.0, 1.0, 1.0)
+    if _has_tints(scene, maps):
+        a, b, c = scene.ways.tints(scene, at)
+        tint = barycentric(a, b, c, spot.u, spot.v)
+    for k in range(MATERIAL_COLUMNS):
+        store(own, k, load(scene.materials, look.material + k))
+    for k in range(EMITTED):
+        put3(own, COLORS[k], _tinted(scene, maps, k, three(own, COLORS[k]), patch, tint))
+    emission = _tinted(scene, maps, EMITTED, three(scene.maps, maps + EMISSION), patch, tint)
+    if load(scene.maps, maps + CUTOFF) == 0.0:
+        # rule: share-that-is-there
+        opacity = _opacity(scene, maps, patch)
+        for k in range(EMITTED):
+            put3(own, COLORS[k], scale(three(own, COLORS[k]), opacity))
+        rest = 1.0 - opacity
+        put3(own, TRANSMITTANCE, add(three(own, TRANSMITTANCE), (rest, rest, rest)))
+        emission = scale(emission, opacity)
+    put3(own, MATERIAL_COLUMNS, emission)
+    return doubles_between(scene.materials, own)
+
+
+@kernel
+def _mapped_normal(scene, spot, look, width):
+    """The shading normal that a texture of normals gives, on the side of the surface from which the ray comes."""
+    maps = _maps_of(look.material)
+    texture = load(scene.maps, maps + NORMAL_MAP)
+    if texture < 0.0:
+        return look.n_s
+    at, number, n = scene.ways.at(scene, spot.face), int(texture), look.n_s
+    along, other = _tangents(scene, at, n)
+    if largest_component(along) == 0.0:
+        return n
+    r, g, b, _ = _texture(scene, number, _patch_at(scene, at, spot.u, spot.v, width, look.facet.double_area))
+    strength = load(scene.textures, number * TEXTURE_COLUMNS + STRENGTH)
+    x, y, z = strength * (2.0 * r - 1.0), strength * (2.0 * g - 1.0), 2.0 * b - 1.0
+    # rule: turned-by-map
+    return normalized(add(add(scale(along, x), scale(other, y)), scale(n, z)))
+
+
+@kernel
+def _tangents(scene, at, n):
+    """The unit vectors across a normal along which u and v grow on a face; zero where texture coordinates do not."""
+    u0, v0, u1, v1, u2, v2 = scene.ways.texcoords(scene, at)
+    p0, p1, p2 = scene.ways.corners(scene, at)
+    e, f = sub(p1, p0), sub(p2, p0)
+    turn = (u1 - u0) * (v2 - v0) - (u2 - u0) * (v1 - v0)
+    along = scale(sub(scale(e, v2 - v0), scale(f, v1 - v0)), 1.0 if turn > 0.0 else -1.0)
+    along = sub(along, scale(n, dot(n, along)))
+    if turn == 0.0 or length(along) == 0.0:
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    along = normalized(along)
+    # Where the image is mirrored on the face, v grows to the other side of u.
+    return along, scale(cross(n, along), 1.0 if turn > 0.0 else -1.0)
+
+
+@inlined
+def _own_glow(scene, row):
+    return add(ambient_light(scene, row), three(scene.materials, row + MATERIAL_COLUMNS))
+
+
+@kernel
+def _is_there(scene, spot):
+    at = scene.ways.at(scene, spot.face)
+    maps = _maps_of(load(scene.material, scene.ways.row(scene, at)))
+    cutoff = load(scene.maps, maps + CUTOFF)
+    return cutoff == 0.0 or _opacity(scene, maps, _patch_at(scene, at, spot.u, spot.v, 0.0, 1.0)) >= cutoff
+
+
+@inlined
+def _has_holes(scene):
+    return scene.holes
+
+
+TEXTURED = LookWays(_own_row, _mapped_normal, _own_glow, _is_there, _has_holes)
