@@ -93,7 +93,7 @@ class Materials:
             image,
             transform=_transform(moved),
             wrap=(_WRAPS[sampler.get("wrapS", 10497)], _WRAPS[sampler.get("wrapT", 10497)]),
-            filter="nearest" if sampler.get("magFilter") == _NEAREST else "linear",
+            filter="nearest" if sampler.get("magFilter") == _NEAREST else "mipmap",
             strength=use.get(strength, 1.0),
         )
 

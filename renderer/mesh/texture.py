@@ -14,7 +14,7 @@ from renderer.errors import MeshError, expect
 from renderer.mesh.texture_image import TextureImage
 
 Wrap = Literal["repeat", "mirror", "clamp"]
-Filter = Literal["linear", "nearest"]
+Filter = Literal["mipmap", "linear", "nearest"]
 Row = tuple[float, float, float]
 
 
@@ -31,8 +31,9 @@ class Texture:
         (1, 1) the upper right one.
     wrap : ({"repeat", "mirror", "clamp"}, {"repeat", "mirror", "clamp"}), default ("repeat", "repeat")
         What is beyond the edges, along u and along v.
-    filter : {"linear", "nearest"}, default "linear"
-        What is between the pixels.
+    filter : {"mipmap", "linear", "nearest"}, default "mipmap"
+        What is between the pixels: a linear mean of four, or the nearest. "mipmap" also takes the mean over about what a
+        ray sees of the image, so that distant textures do not shimmer.
     strength : float, default 1
         How much a map of normals, heights or occlusion counts: the ``scale`` or ``strength`` of glTF, ``-bm`` of MTL.
 
@@ -52,7 +53,7 @@ class Texture:
     image: TextureImage
     transform: tuple[Row, Row] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     wrap: tuple[Wrap, Wrap] = ("repeat", "repeat")
-    filter: Filter = "linear"
+    filter: Filter = "mipmap"
     strength: float = 1.0
 
     def __init__(
@@ -60,19 +61,55 @@ class Texture:
         image: TextureImage | str | os.PathLike[str] | bytes | ArrayLike,
         transform: ArrayLike = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
         wrap: tuple[Wrap, Wrap] = ("repeat", "repeat"),
-        filter: Filter = "linear",
+        filter: Filter = "mipmap",
         strength: float = 1.0,
     ) -> None:
         try:
             rows, factor = numbers("transform", transform, (2, 3)), numbers("strength", strength, ())
             wraps = isinstance(wrap, tuple | list) and len(wrap) == 2 and all(each in get_args(Wrap) for each in wrap)
             expect(wraps, "wrap", f"two of {', '.join(get_args(Wrap))}", repr(wrap))
-            expect(filter in get_args(Filter), "filter", "'linear' or 'nearest'", repr(filter))
+            expect(filter in get_args(Filter), "filter", "'mipmap', 'linear' or 'nearest'", repr(filter))
         except ValueError as error:
             raise MeshError(str(error)) from None
         kept = image if isinstance(image, TextureImage) else TextureImage(image)
         for name, value in zip(_FIELDS, (kept, rows, tuple(wrap), filter, factor), strict=True):
             object.__setattr__(self, name, value)
+
+
+    @classmethod
+    def checker(cls, first: ArrayLike = 0.8, second: ArrayLike = 0.2, squares: ArrayLike = (8.0, 8.0)) -> Texture:
+        """Squares of two colours.
+
+        Parameters
+        ----------
+        first, second : float or array_like, shape (3,), default 0.8 and 0.2
+            Linear colours; the first is that of the lower left square.
+        squares : (float, float), default (8, 8)
+            How many squares there are between texture coordinates 0 and 1.
+
+        Returns
+        -------
+        Texture
+
+        Raises
+        ------
+        MeshError
+            For what is no colour, and for squares that are not two finite numbers.
+
+        Examples
+        --------
+        >>> from renderer import Texture
+        >>> Texture.checker(0.9, (0.5, 0, 0), squares=(4, 2)).transform
+        ((2.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+        """
+        try:
+            across, down = numbers("squares", squares, (2,))
+            colors = [numbers(name, np.broadcast_to(color, 3), (3,)) for name, color in (("first", first), ("second", second))]
+        except ValueError as error:
+            raise MeshError(str(error)) from None
+        a, b = (np.array(color, np.float32) for color in colors)
+        # The first row of an image is the upper one.
+        return cls(np.array([[b, a], [a, b]]), ((across / 2, 0, 0), (0, down / 2, 0)), filter="nearest")
 
 
 _FIELDS = ("image", "transform", "wrap", "filter", "strength")

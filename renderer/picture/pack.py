@@ -1,17 +1,20 @@
 """A scene's instances merged into the arrays that the Whitted kernel reads, and the mesh that the tree is built on."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.inside.rational import crossings_of, winding_of
 from renderer.mesh.mesh import Mesh
+from renderer.picture.maps import Maps, has_holes, maps_of, texcoords_of, tints_of
 from renderer.scene.camera import Camera
 from renderer.scene.light import light_row
 from renderer.scene.material import kind_of, material_row
 from renderer.scene.needs import Features, lit_materials, needs_of
 from renderer.scene.scene import Scene
 from renderer.scene.sky import sky_rows
-from renderer.shade.records import KIND, LAMBERT, LIGHT_COLUMNS, MATERIAL_COLUMNS, PHONG, UNLIT
+from renderer.shade.records import KIND, LAMBERT, LIGHT_COLUMNS, MAP_COLUMNS, MATERIAL_COLUMNS, PHONG, UNLIT
 from renderer.shade.surface import MAX_MEDIA, SceneArrays
 
 
@@ -38,6 +41,11 @@ def pack(scene: Scene, needs: Features | None = None) -> tuple[Mesh, SceneArrays
         material=np.repeat(lit.material, counts),
         smooth=np.repeat(lit.smooth, counts if len(lit.smooth) else 0),
     )
+    if needs.textures:
+        looks = [(i, i.mesh, scene.materials[i.material]) for i in instances]
+        texcoords = np.concatenate([np.zeros((0, 2)), *(texcoords_of(*look) for look in looks)])
+        tints = np.concatenate([np.zeros((0, 3)), *(tints_of(*look) for look in looks)])
+        arrays = arrays._replace(texcoords=texcoords, tints=tints)
     return mesh, arrays
 
 
@@ -52,6 +60,9 @@ def without_faces(scene: Scene, needs: Features) -> SceneArrays:
         material=np.array([rows[i.material] for i in scene.instances], np.int32),
         smooth=np.array([i.smooth for i in scene.instances if needs.smooth_normals], np.bool_),
         materials=_materials(scene, needs),
+        **_maps(scene, needs),
+        texcoords=np.zeros((0, 2)),
+        tints=np.zeros((0, 3)),
         lights=light_rows(scene, needs),
         colors=_colors(scene),
         sky=sky_rows(scene.sky, scene.up),
@@ -62,6 +73,13 @@ def without_faces(scene: Scene, needs: Features) -> SceneArrays:
     )
 
 
+def _maps(scene: Scene, needs: Features) -> dict[str, Any]:
+    """The fields of ``SceneArrays`` that only pictures with textures fill."""
+    if not needs.textures:
+        return Maps(np.zeros((0, MAP_COLUMNS)), np.zeros(0, np.int64), np.zeros(0, np.float32))._asdict()
+    return maps_of(scene.materials.values())._asdict() | {"holes": has_holes(scene.materials.values())}
+
+
 def repacked(arrays: SceneArrays, scene: Scene, needs: Features) -> SceneArrays:
     """``arrays`` with the materials and all light of ``scene``, which has the meshes that they were packed of, and as
     many materials of the same names.
@@ -69,6 +87,7 @@ def repacked(arrays: SceneArrays, scene: Scene, needs: Features) -> SceneArrays:
     media = media_around(scene, scene.camera) if needs.refraction else np.zeros(0, np.int64)
     return arrays._replace(
         materials=_materials(scene, needs),
+        **_maps(scene, needs),
         lights=light_rows(scene, needs),
         colors=_colors(scene),
         sky=sky_rows(scene.sky, scene.up),

@@ -66,7 +66,8 @@ def placed_arrays(scene: Scene, needs: Features, built: BuiltScene) -> SceneArra
     """What the kernel reads beside ``built``, with the addresses of smooth meshes' normals, which ``scene`` keeps."""
     smooth = [i.smooth and needs.smooth_normals for i in scene.instances]
     own = [_normals(i).ctypes.data if is_smooth else 0 for i, is_smooth in zip(scene.instances, smooth, strict=True)]
-    return without_faces(scene, needs)._replace(normals=np.array(own, np.int64), placed=built.top.descriptor)
+    arrays = without_faces(scene, needs)._replace(normals=np.array(own, np.int64), placed=built.top.descriptor)
+    return arrays
 
 
 def _normals(instance: Instance) -> NDArray[np.float64]:

@@ -2,17 +2,31 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import BeforeValidator, Field, model_validator
 
 from renderer.arguments.types import ArrayLike
+from renderer.mesh.texture import Texture
+from renderer.mesh.texture_image import TextureImage
 from renderer.scene.fields import Color, Fields, stated
 from renderer.shade.records import DIELECTRIC, LAMBERT, MIRROR, PHONG, UNLIT
 
+def _texture(value: Any) -> Any:
+    """A texture of what stands for one: an image, or a table of a scene file."""
+    if isinstance(value, dict) and "image" in value:
+        return Texture(**value)
+    return Texture(value) if isinstance(value, str | os.PathLike | TextureImage) else value
+
+
+AnyTexture = Annotated[Texture, BeforeValidator(_texture)]
+# Colours that maps multiply.
+_MAPPED = ("diffuse", "specular", "reflectance", "transmittance", "emission")
+_Share = Annotated[float, Field(ge=0.0, le=1.0, strict=True)]
 _Ior = Annotated[float, Field(gt=0.0, allow_inf_nan=False, strict=True)]
 _BLACK = (0.0, 0.0, 0.0)
 _WHITE = (1.0, 1.0, 1.0)
@@ -48,6 +62,21 @@ class Phong(_Material):
         The share of light that goes through the surface. Under total internal reflection there is none.
     ior : float, default 1.5
         The index of refraction.
+    emission : float or array_like, shape (3,), default 0
+        The radiance of the surface itself. It lights nothing else.
+    opacity : float, default 1
+        The share of the surface that is there, from 0 to 1. The rest lets light through, unbent.
+    cutoff : float, default 0
+        If it is above 0, the surface is there where its opacity is at least this, and nowhere else: leaves, fences.
+    diffuse_map, specular_map, reflectance_map, transmittance_map, emission_map : Texture or path, optional
+        Multiply the colours of these names; integers are sRGB, floats linear. That of ``diffuse``, which is 1 by default
+        beside it, multiplies ``ambient`` too if that has the colour of ``diffuse``.
+    opacity_map : Texture or path, optional
+        Its alpha multiplies ``opacity``.
+    normal_map : Texture or path, optional
+        Normals in the space of the surface's texture coordinates: 0 to 1 stand for -1 to 1.
+    vertex_colors : {"linear", "srgb"}, optional
+        The colours of the mesh's vertices multiply those of ``diffuse``, also as ``ambient``, and of ``emission``.
 
     Raises
     ------
@@ -79,6 +108,26 @@ class Phong(_Material):
     reflectance: Color = _BLACK
     transmittance: Color = _BLACK
     ior: _Ior = 1.5
+    emission: Color = _BLACK
+    opacity: _Share = 1.0
+    cutoff: _Share = 0.0
+    diffuse_map: AnyTexture | None = None
+    specular_map: AnyTexture | None = None
+    reflectance_map: AnyTexture | None = None
+    transmittance_map: AnyTexture | None = None
+    emission_map: AnyTexture | None = None
+    opacity_map: AnyTexture | None = None
+    normal_map: AnyTexture | None = None
+    vertex_colors: Literal["linear", "srgb"] | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _whole_maps(cls, values: Any) -> Any:
+        """Let maps be seen as they are where their colours are not given."""
+        if not isinstance(values, dict):
+            return values
+        mapped = [name for name in _MAPPED if values.get(f"{name}_map") is not None]
+        return {**{name: 1.0 for name in mapped}, **values}
 
     @stated
     def __init__(
@@ -91,8 +140,56 @@ class Phong(_Material):
         reflectance: ArrayLike = 0.0,
         transmittance: ArrayLike = 0.0,
         ior: float = 1.5,
+        emission: ArrayLike = 0.0,
+        opacity: float = 1.0,
+        cutoff: float = 0.0,
+        diffuse_map: Texture | TextureImage | str | os.PathLike[str] | None = None,
+        specular_map: Texture | TextureImage | str | os.PathLike[str] | None = None,
+        reflectance_map: Texture | TextureImage | str | os.PathLike[str] | None = None,
+        transmittance_map: Texture | TextureImage | str | os.PathLike[str] | None = None,
+        emission_map: Texture | TextureImage | str | os.PathLike[str] | None = None,
+        opacity_map: Texture | TextureImage | str | os.PathLike[str] | None = None,
+        normal_map: Texture | TextureImage | str | os.PathLike[str] | None = None,
+        vertex_colors: Literal["linear", "srgb"] | None = None,
         type: Literal["phong"] = "phong",
     ) -> None: ...
+
+    @property
+    def blends(self) -> bool:
+        """Whether a share of light goes through the surface unbent, because it is not all there.
+
+        Examples
+        --------
+        >>> from renderer import Phong
+        >>> Phong(opacity=0.5).blends, Phong(opacity=0.5, cutoff=0.5).blends
+        (True, False)
+        """
+        return self.cutoff == 0.0 and (self.opacity < 1.0 or self.opacity_map is not None)
+
+    @property
+    def textures(self) -> dict[str, Texture]:
+        """The textures that there are, by the names of their fields.
+
+        Examples
+        --------
+        >>> from renderer import Phong
+        >>> Phong(diffuse_map="wood.png").textures
+        {'diffuse_map': Texture(image=TextureImage('wood.png'), ...)}
+        """
+        names = (*(f"{name}_map" for name in _MAPPED), "opacity_map", "normal_map")
+        return {name: texture for name in names if (texture := getattr(self, name)) is not None}
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the surface is the same everywhere, opaque where it is not transparent, and emits nothing.
+
+        Examples
+        --------
+        >>> from renderer import Phong
+        >>> Phong().is_plain, Phong(emission=1).is_plain
+        (True, False)
+        """
+        return not (self.textures or self.vertex_colors or any(self.emission) or self.opacity < 1.0)
 
     @property
     def passes_light(self) -> bool:
@@ -104,7 +201,7 @@ class Phong(_Material):
         >>> Phong().passes_light, Phong(transmittance=0.5).passes_light
         (False, True)
         """
-        return any(self.transmittance)
+        return any(self.transmittance) or self.blends
 
     @property
     def receives_light(self) -> bool:
@@ -247,4 +344,5 @@ def material_row(material: Material) -> NDArray[np.float64]:
     if isinstance(material, Dielectric):
         return np.array([kind, *_BLACK, *_BLACK, *_BLACK, *passed, 0.0, material.ior])
     ambient = material.diffuse if material.ambient is None else material.ambient
-    return np.array([kind, *ambient, *material.diffuse, *material.specular, *passed, material.shininess, material.ior])
+    ior = 1.0 if material.blends else material.ior
+    return np.array([kind, *ambient, *material.diffuse, *material.specular, *passed, material.shininess, ior])

@@ -11,10 +11,12 @@ from renderer.trace.starts.record import ROW
 # The side in pixels of the block that a bundle of camera rays covers, and the most rays of a bundle.
 SIDE = 8
 SIZE = SIDE * SIDE
-# Columns of float64: origin, direction and weight of each ray, and its row of ``starts.record``. Columns of int64: the
+# Columns of float64: origin, direction, weight and width of each ray, and its row of ``starts.record``. Columns of int64: the
 # number of rays and their depth; for each ray its pixel, the number of media that it is in, and room for ``limit`` of
 # them, as the rows of their materials, outermost first.
-_ORIGIN, _DIRECTION, _WEIGHT, _START, BUNDLE_DOUBLES = 0, 3 * SIZE, 6 * SIZE, 9 * SIZE, (9 + ROW) * SIZE
+_ORIGIN, _DIRECTION, _WEIGHT, _WIDTH, _START, BUNDLE_DOUBLES = (
+    0, 3 * SIZE, 6 * SIZE, 9 * SIZE, 10 * SIZE, (10 + ROW) * SIZE
+)  # fmt: skip
 _PIXEL, _COUNT, BUNDLE_INTEGERS = 2, 2 + SIZE, 2 + 2 * SIZE
 
 
@@ -24,6 +26,7 @@ class Bundle(NamedTuple):
     origins: Any
     directions: Any
     weights: Any
+    widths: Any
     starts: Any
     header: Any
     pixels: Any
@@ -40,7 +43,8 @@ def bundle_at(doubles, integers, limit, slot):
         offset(integers, slot * (BUNDLE_INTEGERS + SIZE * limit)),
     )
     return Bundle(
-        offset(doubles, _ORIGIN), offset(doubles, _DIRECTION), offset(doubles, _WEIGHT), offset(doubles, _START),
+        offset(doubles, _ORIGIN), offset(doubles, _DIRECTION), offset(doubles, _WEIGHT), offset(doubles, _WIDTH),
+        offset(doubles, _START),
         integers, offset(integers, _PIXEL), offset(integers, _COUNT), offset(integers, BUNDLE_INTEGERS), limit,
     )  # fmt: skip
 
@@ -65,7 +69,7 @@ def depth_of(bundle):
 
 
 @inlined
-def append(bundle, o, d, weight, pixel, media, count):
+def append(bundle, o, d, weight, width, pixel, media, count):
     """Add a ray inside the first ``count`` of ``media``. Returns its row of starts, to be written."""
     i = load(bundle.header, 0)
     store(bundle.header, 0, i + 1)
@@ -73,6 +77,7 @@ def append(bundle, o, d, weight, pixel, media, count):
         store(bundle.origins, 3 * i + k, o[k])
         store(bundle.directions, 3 * i + k, d[k])
         store(bundle.weights, 3 * i + k, weight[k])
+    store(bundle.widths, i, width)
     store(bundle.pixels, i, pixel)
     store(bundle.media_counts, i, count)
     for k in range(count):

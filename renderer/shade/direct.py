@@ -7,12 +7,13 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import load, offset, store
-from renderer.numerics.vec3 import add, put3, row3, sub, three, times
+from renderer.numerics.vec3 import add, largest_component, put3, row3, sub, three, times
 from renderer.shade.bundle import SIZE
 from renderer.shade.crossing import place_at
 from renderer.shade.lights import aim, aim_off, see_light
+from renderer.shade.looks import OWN_COLUMNS
 from renderer.shade.records import DIELECTRIC, KIND, MIRROR, TRANSMITTANCE, UNLIT
-from renderer.shade.surface import bounds_at, lets_through, phong, raised, surface_at
+from renderer.shade.surface import bounds_at, look_at, phong, raised, surface_at
 from renderer.trace.rays import RayPointers
 from renderer.trace.spawn import Facet, Place, put_all_visible, put_no_start, put_start, spawn_origin
 from renderer.trace.starts.level import Spot
@@ -135,30 +136,65 @@ def _shadow_rays(scene, shadows, zero, k):
 
 @kernel
 def _pass_through(tree, scene, scratch, k, rule):
-    """Follow the k-th shadow ray, which hits something, through all that transmits light: the light that arrives is
-    multiplied by the transmittance of each face. Returns whether an opaque face hides the light, and the number of rays
+    """Follow the k-th shadow ray, which hits something, through holes of masks, and where shadows are clear through all
+    that transmits light: the light that arrives is multiplied by the transmittance of each face. Returns whether an opaque face hides the light, and the number of rays
     traced beyond the first.
     """
     shadows, found = scratch.shadows, scratch.passed
-    row, start, rays = 3 * k, offset(shadows, _START + ROW * k), 0
+    row, rays = 3 * k, 0
     while True:
         trace_rays(tree, _shadow_rays(scene, shadows, scratch.zero, k), found, 1, scratch.trace, np.bool_(False))
         if load(found.face, 0) < 0:
             return False, rays
-        d, t_max = three(shadows, _DIRECTION + row), load(shadows, _T_MAX + k)
+        d = three(shadows, _DIRECTION + row)
         spot = Spot(load(found.face, 0), load(found.u, 0), load(found.v, 0))
-        met = surface_at(scene, spot.face, spot.u, spot.v, d)
-        # rule: clear-shadows
-        if not lets_through(scene.materials, met.material) or rays == MOST_PANES:
+        if rays == MOST_PANES:
             return True, rays
-        through = three(scene.materials, met.material + TRANSMITTANCE)
-        put3(shadows, _ARRIVING + row, times(three(shadows, _ARRIVING + row), through))
-        o = spawn_origin(met.p, met.error, met.n_g, d, rule)
-        onwards = d if t_max == np.inf else sub(add(three(shadows, _ORIGIN + row), d), o)
-        put_start(start, place_at(spot, met, d), met.n_g, onwards, d, rule)
-        put3(shadows, _ORIGIN + row, o)
-        put3(shadows, _DIRECTION + row, onwards)
+        if scene.looks.is_there(scene, spot):
+            through = _share_through(scene, scratch, spot, d)
+            # rule: clear-shadows
+            if not (scene.clear and largest_component(through) > 0.0):
+                return True, rays
+            put3(shadows, _ARRIVING + row, times(three(shadows, _ARRIVING + row), through))
+        _go_on(scene, shadows, k, spot, rule)
         rays += 1
+
+
+@inlined
+def _share_through(scene, scratch, spot, d):
+    """The share of light from direction d that the surface at a spot transmits."""
+    look = look_at(scene, spot.face, spot.u, spot.v, d)
+    row = scene.looks.row(scene, spot, look, 0.0, offset(scratch.own, SIZE * OWN_COLUMNS))
+    return three(scene.materials, row + TRANSMITTANCE)
+
+
+@inlined
+def _go_on(scene, shadows, k, spot, rule):
+    """Start the k-th shadow ray anew behind the ``Spot`` that it hit, towards the same end."""
+    row, start = 3 * k, offset(shadows, _START + ROW * k)
+    d, t_max = three(shadows, _DIRECTION + row), load(shadows, _T_MAX + k)
+    met = surface_at(scene, spot.face, spot.u, spot.v, d)
+    o = spawn_origin(met.p, met.error, met.n_g, d, rule)
+    onwards = d if t_max == np.inf else sub(add(three(shadows, _ORIGIN + row), d), o)
+    put_start(start, place_at(spot, met, d), met.n_g, onwards, d, rule)
+    put3(shadows, _ORIGIN + row, o)
+    put3(shadows, _DIRECTION + row, onwards)
+
+
+@kernel
+def behind_holes(tree, scene, scratch, d, spot, rule):
+    """Follow a ray of direction d from a ``Spot`` where a mask leaves out the surface to the first where none does, or
+    past everything: face -1. Returns the distance and that spot. In place of the first shadow ray.
+    """
+    shadows, found, t, panes = scratch.shadows, scratch.passed, 0.0, 0
+    put3(shadows, _DIRECTION, d)
+    store(shadows, _T_MAX, np.inf)
+    while spot.face >= 0 and panes < MOST_PANES and not scene.looks.is_there(scene, spot):
+        _go_on(scene, shadows, 0, spot, rule)
+        trace_rays(tree, _shadow_rays(scene, shadows, scratch.zero, 0), found, 1, scratch.trace, np.bool_(False))
+        t, spot = t + load(found.t, 0), Spot(load(found.face, 0), load(found.u, 0), load(found.v, 0))
+        panes += 1
+    return t, spot
 
 
 @inlined
@@ -168,7 +204,7 @@ def _trace_shadows(tree, scene, bundle, lit, aimed, rule, scratch):
     trace_rays(tree, rays, scratch.found, aimed, scratch.trace, np.bool_(True))
     for k in range(aimed):
         pixel, more = load(bundle.pixels, load(lit, SIZE + k)), 0
-        if scene.clear and load(scratch.found.hit, k):
+        if (scene.clear or scene.looks.has_holes(scene)) and load(scratch.found.hit, k):
             hidden, more = _pass_through(tree, scene, scratch, k, rule)
             store(scratch.found.hit, k, hidden)
         store(scratch.traced, pixel, load(scratch.traced, pixel) + 1 + more)

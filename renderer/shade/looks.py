@@ -3,9 +3,8 @@
 Other pictures have kernels without any of this, chosen when they are compiled.
 """
 
-from typing import Any, NamedTuple
-
 import math
+from typing import Any, NamedTuple
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import doubles_between, load, store

@@ -9,6 +9,7 @@ from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import load, minimum, pointer
 from renderer.numerics.vec3 import add, barycentric, dot, largest_component, normalized, row3, scale, sub, three
 from renderer.shade.faces import MERGED, PLACED, FaceWays
+from renderer.shade.looks import PLAIN, TEXTURED, LookWays
 from renderer.shade.records import DIFFUSE, KIND, PHONG, SHININESS, SPECULAR, TRANSMITTANCE
 from renderer.shade.shading import specular
 from renderer.trace.instances import scene_pointers as instance_pointers
@@ -30,6 +31,11 @@ class SceneArrays(NamedTuple):
     material   (R,) int32, for each face the start of its material's row in the flat array ``materials``
     smooth     (R,) bool, no rows if no face is smooth
     materials  (M, MATERIAL_COLUMNS)
+    maps       (M, MAP_COLUMNS), no rows in pictures without textures
+    textures   (T, TEXTURE_COLUMNS) float64; empty int64 in pictures without textures
+    texels     (n,) float32, red, green, blue and alpha of the images of textures, linear
+    texcoords  (V, 2), and
+    tints      (V, 3), colours of vertices, linear; as ``normals`` of placed meshes, no rows without textures
     lights     (L, LIGHT_COLUMNS)
     colors     (2, 3), ambient and background
     sky        (4, 3), the unit vector up, and the radiance of zenith, horizon and ground; no rows without a sky
@@ -37,6 +43,9 @@ class SceneArrays(NamedTuple):
     touching   (R,) uint8, not 0 for faces that may coincide with one that transmits light; no rows if none does
     soft       whether the terminator of smooth faces is soft
     clear      whether light passes surfaces that transmit light
+    holes      whether a mask leaves out any surface
+    pixel      the width of camera rays where they start, and
+    spread     by how much rays are wider after a distance of 1
     """
 
     vertices: NDArray[np.float64]
@@ -46,6 +55,11 @@ class SceneArrays(NamedTuple):
     material: NDArray[np.int32]
     smooth: NDArray[np.bool_]
     materials: NDArray[np.float64]
+    maps: NDArray[np.float64]
+    textures: NDArray[Any]
+    texels: NDArray[np.float32]
+    texcoords: NDArray[Any]
+    tints: NDArray[Any]
     lights: NDArray[np.float64]
     colors: NDArray[np.float64]
     sky: NDArray[np.float64]
@@ -53,10 +67,13 @@ class SceneArrays(NamedTuple):
     touching: NDArray[np.uint8]
     soft: bool
     clear: bool
+    holes: bool = False
+    pixel: float = 0.0
+    spread: float = 0.0
 
 
 class ScenePointers(NamedTuple):
-    """A ``SceneArrays`` as pointers, with the ``FaceWays``, the numbers of lights and of media around the eye, and
+    """A ``SceneArrays`` as pointers, with the ``FaceWays`` and ``LookWays``, the numbers of lights and of media around the eye, and
     whether any face is smooth, any touches another and there is a sky.
     """
 
@@ -68,6 +85,12 @@ class ScenePointers(NamedTuple):
     material: Any
     smooth: Any
     materials: Any
+    maps: Any
+    textures: Any
+    texels: Any
+    texcoords: Any
+    tints: Any
+    looks: LookWays
     lights: Any
     colors: Any
     sky: Any
@@ -80,6 +103,19 @@ class ScenePointers(NamedTuple):
     has_sky: bool
     soft: bool
     clear: bool
+    holes: bool
+    pixel: float
+    spread: float
+
+
+@inlined
+def _plain(textures):
+    return PLAIN
+
+
+@inlined
+def _textured(textures):
+    return TEXTURED
 
 
 @inlined
@@ -105,6 +141,12 @@ def scene_pointers(scene):
         pointer(scene.material),
         pointer(scene.smooth),
         pointer(scene.materials),
+        pointer(scene.maps),
+        pointer(scene.textures),
+        pointer(scene.texels),
+        pointer(scene.texcoords),
+        pointer(scene.tints),
+        of_kind(scene.textures, _plain, _textured)(scene.textures),
         pointer(scene.lights),
         pointer(scene.colors),
         pointer(scene.sky),
@@ -117,6 +159,9 @@ def scene_pointers(scene):
         len(scene.sky) > 0,
         scene.soft,
         scene.clear,
+        scene.holes,
+        scene.pixel,
+        scene.spread,
     )
 
 

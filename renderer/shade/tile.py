@@ -124,7 +124,7 @@ def _shoot(camera, scene, bundle, place, block):
             px, py = x + across, y + down
             o, d = _listed_ray(camera, place, x, y) if camera.listed else _affine_ray(camera.rays, px, py)
             if d[0] == d[0]:
-                append(bundle, o, d, (1.0, 1.0, 1.0), j * SIDE + i, scene.media, scene.media_count)
+                append(bundle, o, d, (1.0, 1.0, 1.0), scene.pixel, j * SIDE + i, scene.media, scene.media_count)
 
 
 @inlined
@@ -151,7 +151,7 @@ def _look(tree, scene, settings, camera, film, scratch, block):
     """
     bundle = slot(scratch, settings, 0)
     _shoot(camera, scene, bundle, camera.centre, block)
-    meet(tree, scene, bundle, scratch)
+    meet(tree, scene, settings, bundle, scratch)
     _write_first_hits(film, bundle, scratch, block)
 
 

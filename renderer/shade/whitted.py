@@ -48,6 +48,7 @@ from renderer.shade.direct import (
     SHADOW_DOUBLES,
     SURFACE_DOUBLES,
     begin_shadows,
+    behind_holes,
     is_lit,
     light_surfaces,
     place_of,
@@ -55,9 +56,10 @@ from renderer.shade.direct import (
     put_facet,
     put_place,
 )
-from renderer.shade.records import AMBIENT, DIELECTRIC, KIND, MIRROR, REFLECTANCE, TRANSMITTANCE
+from renderer.shade.looks import OWN_COLUMNS
+from renderer.shade.records import DIELECTRIC, KIND, MIRROR, REFLECTANCE, TRANSMITTANCE
 from renderer.shade.shading import fresnel, reflect, refract
-from renderer.shade.surface import lets_through, look_at, missed, scene_pointers, surface_at
+from renderer.shade.surface import Look, lets_through, look_at, missed, scene_pointers, surface_at
 from renderer.trace.rays import HitPointers, RayPointers
 from renderer.trace.spawn import OffsetRule, Place, put_all_visible, put_start, spawn_origin
 from renderer.trace.starts.level import Spot
@@ -84,13 +86,17 @@ class Settings(NamedTuple):
     max_rays: int
 
 
+# The rows of materials of a bundle's rays, and of a shadow ray.
+OWN = (SIZE + 1) * OWN_COLUMNS
+
+
 class BundleScratch(NamedTuple):
     """Scratch of one thread, as pointers.
 
     The bundles and the order of their places: waiting ones first, then free ones. For tracing: scratch, hits, and a
     zero and an infinity as bounds. For the current bundle: surfaces, shadow rays, the list of lit rays, and the media
     beyond the surfaces; the hit of one shadow ray. For each pixel: colour, number of rays traced, and whether
-    ``Settings.max_rays`` cut it.
+    ``Settings.max_rays`` cut it. For each ray, and one shadow ray, the row of its material at the point hit.
     """
 
     bundles: Any
@@ -108,6 +114,7 @@ class BundleScratch(NamedTuple):
     color: Any
     traced: Any
     cut: Any
+    own: Any
 
 
 def scratch_lengths(settings: Settings) -> tuple[int, int]:
@@ -116,7 +123,7 @@ def scratch_lengths(settings: Settings) -> tuple[int, int]:
     At most one bundle waits on each level; one more is current, and two places are free for those that it spawns.
     """
     slots = settings.max_depth + 4
-    doubles = slots * BUNDLE_DOUBLES + 3 * SIZE + 2 + SIZE * SURFACE_DOUBLES + SHADOW_DOUBLES + 3 * SIZE + 3
+    doubles = slots * BUNDLE_DOUBLES + 3 * SIZE + 2 + SIZE * SURFACE_DOUBLES + SHADOW_DOUBLES + 3 * SIZE + 3 + OWN
     beyond = SIZE * (settings.media + SPARE)
     integers = slots * (BUNDLE_INTEGERS + SIZE * settings.media + 1) + SIZE + 1 + 2 * SIZE + beyond + 3 * SIZE + 2
     return doubles, integers
@@ -142,11 +149,12 @@ def bundle_scratch(doubles, integers, hits, settings, trace):
     found = HitPointers(t, face, u, v, side, side, hits)
     color = offset(shadows, SHADOW_DOUBLES)
     one, its_face = offset(color, 3 * SIZE), offset(side, SIZE)
+    own = offset(one, 3)
     its_side = offset(its_face, 1)
     passed = HitPointers(one, its_face, offset(one, 1), offset(one, 2), its_side, its_side, hits)
     return BundleScratch(
         doubles, integers, order, trace, found, zero, infinity, surfaces, shadows, lit, beyond, passed, color, traced,
-        offset(traced, SIZE),
+        offset(traced, SIZE), own,
     )  # fmt: skip
 
 
@@ -182,11 +190,10 @@ def _beyond(scratch, limit, i):
 
 
 @inlined
-def _put_change(scene, bundle, scratch, i, together, inside):
-    """Write the change of media of ray ``i`` at the surface that it hit."""
+def _put_change(scene, bundle, scratch, i, together, inside, m):
+    """Write the change of media of ray ``i`` at the surface that it hit, of material ``m``."""
     surface = offset(scratch.surfaces, i * SURFACE_DOUBLES)
     media = Media(offset(bundle.media, i * bundle.limit), load(bundle.media_counts, i), bundle.limit)
-    m = np.int64(load(surface, MATERIAL))
     change = cross(scene, together, m, inside, media, _beyond(scratch, bundle.limit, i), scratch.trace.holders)
     put3(surface, CHANGE, (change.n1, change.n2, float(change.left)))
     last = together.far
@@ -195,25 +202,31 @@ def _put_change(scene, bundle, scratch, i, together, inside):
 
 @inlined
 def _put_look(scene, bundle, scratch, i, together, look):
-    """Write what ray ``i`` sees where it hits several faces together, and its ambient light, to ``scratch``."""
+    """Write what ray ``i`` sees where it hits several faces together, and its ambient light, to ``scratch``. Returns the
+    row of its material, see ``LookWays.row``.
+    """
     surface, d = offset(scratch.surfaces, i * SURFACE_DOUBLES), row3(bundle.directions, i)
+    width = load(bundle.widths, i) + scene.spread * load(scratch.found.t, i)
+    store(bundle.widths, i, width)
+    row = scene.looks.row(scene, together.seen, look, width, offset(scratch.own, i * OWN_COLUMNS))
+    look = Look(look.p, look.facet, scene.looks.normal(scene, together.seen, look, width), look.material)
     # The shading normal faces the eye; a surface without light from behind has two sides.
     inside = dot(d, look.n_s) > 0.0
     put3(surface, POINT, look.p)
     put3(surface, NORMAL, scale(look.n_s, -1.0) if inside else look.n_s)
     put_facet(surface, look.facet)
     put_place(surface, together.near, came_from(look.facet.normal, d))
-    store(surface, MATERIAL, float(look.material))
+    store(surface, MATERIAL, float(row))
     store(surface, INSIDE, 1.0 if inside else 0.0)
-    put3(surface, LIGHT, times(three(scene.materials, look.material + AMBIENT), row3(scene.colors, 0)))
-    if passes_light(scene.materials, look.material):
-        _put_change(scene, bundle, scratch, i, together, inside)
-    return look.material
+    put3(surface, LIGHT, scene.looks.glow(scene, row))
+    if passes_light(scene.materials, row):
+        _put_change(scene, bundle, scratch, i, together, inside, look.material)
+    return row
 
 
 @kernel
 def _meet_together(tree, scene, bundle, scratch, i, spot):
-    """Write what ray ``i`` sees at a ``Spot`` where faces may coincide. Returns its material."""
+    """Write what ray ``i`` sees at a ``Spot`` where faces may coincide. Returns the row of its material."""
     d = row3(bundle.directions, i)
     together = faces_together(tree, scene, spot, d, scratch.trace.packet_stack, scratch.trace.holders)
     store(scratch.found.face, i, together.seen.face)
@@ -222,7 +235,7 @@ def _meet_together(tree, scene, bundle, scratch, i, spot):
 
 @inlined
 def _meet_surface(tree, scene, bundle, scratch, i):
-    """Write what ray ``i`` sees. Returns its material."""
+    """Write what ray ``i`` sees. Returns the row of its material."""
     found = scratch.found
     spot = Spot(load(found.face, i), load(found.u, i), load(found.v, i))
     if may_coincide(scene, spot.face):
@@ -318,11 +331,11 @@ def _exit_at(scene, row, d):
 
 
 @inlined
-def _spawn(leaving, pixel, d, w, weight, children, media, count, settings):
+def _spawn(leaving, pixel, d, w, weight, width, children, media, count, settings):
     """Add to ``children`` the ray in direction w from an ``_Exit``, spawned by a ray of ``pixel`` in direction d."""
     w = normalized(w)
     o = spawn_origin(leaving.p, leaving.error, leaving.n_g, w, settings.offset)
-    row = append(children, o, w, weight, pixel, media, count)
+    row = append(children, o, w, weight, width, pixel, media, count)
     put_start(row, leaving.place, leaving.n_g, w, d, settings.offset)
 
 
@@ -348,16 +361,17 @@ def _bounce(scene, bundle, settings, scratch, refracted, reflected):
         surface = offset(scratch.surfaces, i * SURFACE_DOUBLES)
         m, weight, pixel = np.int64(load(surface, MATERIAL)), row3(bundle.weights, i), load(bundle.pixels, i)
         d, n, k_r = row3(bundle.directions, i), three(surface, NORMAL), three(materials, m + REFLECTANCE)
+        width = load(bundle.widths, i)
         if passes_light(materials, m):
             n1, n2, left = three(surface, CHANGE)
             w, passes, k_r, k_t = _refract(scene, m, d, n, n1, n2)
             if passes and _may_leave(scratch, pixel, times(weight, k_t), settings):
                 leaving, beyond = _exit_beyond(scene, surface, d), _beyond(scratch, bundle.limit, i)
-                _spawn(leaving, pixel, d, w, times(weight, k_t), refracted, beyond, np.int64(left), settings)
+                _spawn(leaving, pixel, d, w, times(weight, k_t), width, refracted, beyond, np.int64(left), settings)
         if _may_leave(scratch, pixel, times(weight, k_r), settings):
             media, count = offset(bundle.media, i * bundle.limit), load(bundle.media_counts, i)
             w = reflect(d, n)
-            _spawn(_exit_of(surface), pixel, d, w, times(weight, k_r), reflected, media, count, settings)
+            _spawn(_exit_of(surface), pixel, d, w, times(weight, k_r), width, reflected, media, count, settings)
 
 
 @inlined
@@ -374,20 +388,36 @@ def _collect_light(scene, bundle, scratch):
             put3(scratch.color, 3 * pixel, add(row3(scratch.color, pixel), own))
 
 
+@kernel
+def _go_through_holes(tree, scene, settings, bundle, scratch):
+    """Let the rays of a bundle go on where masks leave out the surfaces that they hit."""
+    found = scratch.found
+    for i in range(count_of(bundle)):
+        spot = Spot(load(found.face, i), load(found.u, i), load(found.v, i))
+        if spot.face >= 0 and not scene.looks.is_there(scene, spot):
+            t, spot = behind_holes(tree, scene, scratch, row3(bundle.directions, i), spot, settings.offset)
+            store(found.t, i, load(found.t, i) + t)
+            store(found.face, i, spot.face)
+            store(found.u, i, spot.u)
+            store(found.v, i, spot.v)
+
+
 @inlined
-def meet(tree, scene, bundle, scratch):
+def meet(tree, scene, settings, bundle, scratch):
     """Trace the rays of a bundle and write the surfaces that they hit, not yet lit, to ``scratch``."""
     # Those of camera rays are all alike: they start on no surface.
     starts = StartPointers(bundle.starts, ROW if depth_of(bundle) > 0 else 0, scene.vertices, scene.faces)
     rays = RayPointers(bundle.origins, bundle.directions, scratch.zero, scratch.infinity, 3, 3, 0, 0, 1.0, starts)
     trace_rays(tree, rays, scratch.found, count_of(bundle), scratch.trace, np.bool_(False))
+    if scene.looks.has_holes(scene):
+        _go_through_holes(tree, scene, settings, bundle, scratch)
     _meet_surfaces(tree, scene, bundle, scratch)
 
 
 @kernel
 def trace_bundle(tree, scene, settings, bundle, scratch):
     """Trace the rays of a bundle and light the surfaces that they hit; ``push_children`` spawns further rays."""
-    meet(tree, scene, bundle, scratch)
+    meet(tree, scene, settings, bundle, scratch)
     light_surfaces(tree, scene, bundle, scratch.surfaces, scratch.lit, settings, scratch)
     _collect_light(scene, bundle, scratch)
 

@@ -60,10 +60,10 @@ def _mesh_pointers(descriptor):
 
 
 @intrinsic
-def of_kind(typingctx, descriptor, of_tree, of_scene):
-    """The kernel for the kind of a descriptor: scenes have uint64, trees int64."""
-    chosen = of_scene if descriptor.dtype == types.uint64 else of_tree
-    return chosen(descriptor, of_tree, of_scene), lambda context, builder, sig, args: context.get_dummy_value()
+def of_kind(typingctx, array, of_int64, of_others):
+    """One of two kernels, by the type of an array when the caller is compiled. Of scenes a descriptor has uint64."""
+    chosen = of_int64 if array.dtype == types.int64 else of_others
+    return chosen(array, of_int64, of_others), lambda context, builder, sig, args: context.get_dummy_value()
 
 
 @inlined
