@@ -32,8 +32,8 @@ class Texture:
     wrap : ({"repeat", "mirror", "clamp"}, {"repeat", "mirror", "clamp"}), default ("repeat", "repeat")
         What is beyond the edges, along u and along v.
     filter : {"mipmap", "linear", "nearest"}, default "mipmap"
-        What is between the pixels: a linear mean of four, or the nearest. "mipmap" also takes the mean over about what a
-        ray sees of the image, so that distant textures do not shimmer.
+        What is between the pixels: a linear mean of four, or the nearest. "mipmap" also takes the mean over about what
+        a ray sees of the image, so that distant textures do not shimmer.
     strength : float, default 1
         How much a map of normals, heights or occlusion counts: the ``scale`` or ``strength`` of glTF, ``-bm`` of MTL.
 
@@ -75,7 +75,6 @@ class Texture:
         for name, value in zip(_FIELDS, (kept, rows, tuple(wrap), filter, factor), strict=True):
             object.__setattr__(self, name, value)
 
-
     @classmethod
     def checker(cls, first: ArrayLike = 0.8, second: ArrayLike = 0.2, squares: ArrayLike = (8.0, 8.0)) -> Texture:
         """Squares of two colours.
@@ -104,7 +103,9 @@ class Texture:
         """
         try:
             across, down = numbers("squares", squares, (2,))
-            colors = [numbers(name, np.broadcast_to(color, 3), (3,)) for name, color in (("first", first), ("second", second))]
+            colors = [
+                numbers(name, np.broadcast_to(color, 3), (3,)) for name, color in (("first", first), ("second", second))
+            ]
         except ValueError as error:
             raise MeshError(str(error)) from None
         a, b = (np.array(color, np.float32) for color in colors)

@@ -55,10 +55,10 @@ def maps_of(materials: Iterable[Material]) -> Maps:
         return -1.0 if texture is None else float(textures.setdefault((texture, is_color), len(textures)))
 
     rows = [_row(material, number) for material in materials]
-    table = [_texture_row(texture, *images.placed(texture.image, is_color, texture.filter)) for texture, is_color in textures]
-    return Maps(
-        np.array(rows).reshape(-1, MAP_COLUMNS), np.array(table).reshape(-1, TEXTURE_COLUMNS), images.texels()
-    )
+    table = [
+        _texture_row(texture, *images.placed(texture.image, is_color, texture.filter)) for texture, is_color in textures
+    ]
+    return Maps(np.array(rows).reshape(-1, MAP_COLUMNS), np.array(table).reshape(-1, TEXTURE_COLUMNS), images.texels())
 
 
 def _row(material: Material, number: Any) -> NDArray[np.float64]:

@@ -26,9 +26,9 @@ _LEAST = 1 << 14
 _NOT_MOVED = np.eye(3, 4)
 
 
-def placed(scene: Scene, split: Literal["midpoint", "sah"], threads: int) -> BuiltScene | None:
+def placed(scene: Scene, needs: Features, split: Literal["midpoint", "sah"], threads: int) -> BuiltScene | None:
     """``scene`` with each mesh once, where it pays; None where it does not, or where a mesh cannot be placed."""
-    if _copied(scene) < _LEAST:
+    if _copied(scene) < _LEAST or needs.textures:
         return None
     stands = list(_stands(scene))
     sources = {id(mesh): mesh for mesh, _ in stands}

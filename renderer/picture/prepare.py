@@ -140,6 +140,9 @@ class PreparedScene:
         settings = kernel_settings_of(self.needs, chosen, offset, media)
         arrays = arrays_for(self, camera, offset, media)
         arrays = arrays._replace(soft=chosen.terminator == "soft", clear=chosen.glass_shadows == "clear")
+        if self.needs.textures:
+            pixel, spread = _widths(camera, (width, height), chosen.samples)
+            arrays = arrays._replace(pixel=pixel, spread=spread)
         wide, tall = end_column - first_column, end_row - first_row
         across, cut = -(-wide // side), np.zeros(tiles(wide, tall, side), np.int64)
 
@@ -170,7 +173,7 @@ def prepare_scene(
 ) -> PreparedScene:
     """Make ``scene`` ready, by checked arguments; see ``render``."""
     clock, threads = Stopwatch(), checked_threads(threads)
-    built = placed(scene, split, threads) if accelerator == "auto" and needs.octree else None
+    built = placed(scene, needs, split, threads) if accelerator == "auto" and needs.octree else None
     if built is not None:
         return _with_touching(scene, built, needs, placed_arrays(scene, needs, built), threads, clock)
     mesh, arrays = pack(scene, needs)
@@ -232,6 +235,15 @@ def _widened(tree: Tree) -> Tree:
     blocks = cache_aligned(len(tree.blocks), np.float64)
     blocks[:] = tree.blocks
     return replace(tree, blocks=blocks)
+
+
+def _widths(camera: Camera, resolution: tuple[int, int], samples: int) -> tuple[float, float]:
+    """The width of camera rays where they start, and by how much they are wider after a distance of 1: that between
+    the samples in the middle of the film.
+    """
+    middle, step = np.array(resolution) / 2.0, 1.0 / np.sqrt(samples)
+    origins, directions = camera.rays([middle, np.add(middle, (step, 0.0))], resolution)
+    return float(np.linalg.norm(origins[1] - origins[0])), float(np.linalg.norm(directions[1] - directions[0]))
 
 
 def kernel_settings_of(

@@ -16,6 +16,7 @@ from renderer.mesh.texture_image import TextureImage
 from renderer.scene.fields import Color, Fields, stated
 from renderer.shade.records import DIELECTRIC, LAMBERT, MIRROR, PHONG, UNLIT
 
+
 def _texture(value: Any) -> Any:
     """A texture of what stands for one: an image, or a table of a scene file."""
     if isinstance(value, dict) and "image" in value:
@@ -69,8 +70,8 @@ class Phong(_Material):
     cutoff : float, default 0
         If it is above 0, the surface is there where its opacity is at least this, and nowhere else: leaves, fences.
     diffuse_map, specular_map, reflectance_map, transmittance_map, emission_map : Texture or path, optional
-        Multiply the colours of these names; integers are sRGB, floats linear. That of ``diffuse``, which is 1 by default
-        beside it, multiplies ``ambient`` too if that has the colour of ``diffuse``.
+        Multiply the colours of these names, which are 1 by default beside them; integers are sRGB, floats linear. That
+        of ``diffuse`` multiplies ``ambient`` too if that has the colour of ``diffuse``.
     opacity_map : Texture or path, optional
         Its alpha multiplies ``opacity``.
     normal_map : Texture or path, optional

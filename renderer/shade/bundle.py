@@ -11,9 +11,9 @@ from renderer.trace.starts.record import ROW
 # The side in pixels of the block that a bundle of camera rays covers, and the most rays of a bundle.
 SIDE = 8
 SIZE = SIDE * SIDE
-# Columns of float64: origin, direction, weight and width of each ray, and its row of ``starts.record``. Columns of int64: the
-# number of rays and their depth; for each ray its pixel, the number of media that it is in, and room for ``limit`` of
-# them, as the rows of their materials, outermost first.
+# Columns of float64: origin, direction, weight and width of each ray, and its row of ``starts.record``. Columns of
+# int64: the number of rays and their depth; for each ray its pixel, the number of media that it is in, and room for
+# ``limit`` of them, as the rows of their materials, outermost first.
 _ORIGIN, _DIRECTION, _WEIGHT, _WIDTH, _START, BUNDLE_DOUBLES = (
     0, 3 * SIZE, 6 * SIZE, 9 * SIZE, 10 * SIZE, (10 + ROW) * SIZE
 )  # fmt: skip

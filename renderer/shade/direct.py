@@ -137,8 +137,8 @@ def _shadow_rays(scene, shadows, zero, k):
 @kernel
 def _pass_through(tree, scene, scratch, k, rule):
     """Follow the k-th shadow ray, which hits something, through holes of masks, and where shadows are clear through all
-    that transmits light: the light that arrives is multiplied by the transmittance of each face. Returns whether an opaque face hides the light, and the number of rays
-    traced beyond the first.
+    that transmits light: the light that arrives is multiplied by the transmittance of each face. Returns whether an
+    opaque face hides the light, and the number of rays traced beyond the first.
     """
     shadows, found = scratch.shadows, scratch.passed
     row, rays = 3 * k, 0

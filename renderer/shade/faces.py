@@ -159,6 +159,4 @@ def _instance_row(scene, at):
     return (at >> _FACE_BITS) - 1
 
 
-PLACED = FaceWays(
-    _place, _placed_corners, _placed_normals, _placed_texcoords, _placed_tints, _instance_row, _touches
-)
+PLACED = FaceWays(_place, _placed_corners, _placed_normals, _placed_texcoords, _placed_tints, _instance_row, _touches)

@@ -12,9 +12,9 @@ PHONG, MIRROR, DIELECTRIC, LAMBERT, UNLIT = 0, 1, 2, 3, 4
 LIGHT_COLUMNS = 7
 DIRECTIONAL, POINT = 0, 1
 
-# One row per material of a picture with textures, float64: for each of its colours, and for the emission, which only such
-# pictures have, the number of a texture or -1, and whether colours of vertices multiply it; the emission; the textures of
-# normals or -1; the opacity, its texture or -1, and the opacity below which a surface is not there, 0 for none.
+# One row per material of a picture with textures, float64: for each of its colours, and for the emission, which only
+# such pictures have, the number of a texture or -1, and whether colours of vertices multiply it; the emission; the
+# texture of normals or -1; the opacity, its texture or -1, and the opacity below which a surface is not there, or 0.
 COLORS = (AMBIENT, DIFFUSE, SPECULAR, REFLECTANCE, TRANSMITTANCE)
 EMITTED = len(COLORS)
 EMISSION, NORMAL_MAP, OPACITY, OPACITY_MAP, CUTOFF, MAP_COLUMNS = 12, 15, 16, 17, 18, 19

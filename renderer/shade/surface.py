@@ -73,8 +73,8 @@ class SceneArrays(NamedTuple):
 
 
 class ScenePointers(NamedTuple):
-    """A ``SceneArrays`` as pointers, with the ``FaceWays`` and ``LookWays``, the numbers of lights and of media around the eye, and
-    whether any face is smooth, any touches another and there is a sky.
+    """A ``SceneArrays`` as pointers, with the ``FaceWays`` and ``LookWays``, the numbers of lights and of media around
+    the eye, and whether any face is smooth, any touches another and there is a sky.
     """
 
     vertices: Any

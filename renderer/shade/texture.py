@@ -75,10 +75,10 @@ def _level_of(pixels, levels):
     """The finer of two levels whose texels have the width of so many pixels, and the share of the coarser."""
     if not pixels > 1.0:
         return np.int64(0), 0.0
-    if not pixels < 2.0 ** 30:
+    if not pixels < 2.0**30:
         return levels - 1, 0.0
     width, level = power_below(pixels), np.int64(0)
-    while level < levels - 1 and 2.0 <= width:
+    while level < levels - 1 and width >= 2.0:
         width *= 0.5
         level += 1
     # Linear between two powers of two.
@@ -120,9 +120,7 @@ def _between_four(scene, row, first, wide, high, x, y):
     x, y = x * wide - 0.5, y * high - 0.5
     left, low = np.floor(x), np.floor(y)
     i, j, s, t = np.int64(left), np.int64(low), x - left, y - low
-    lower = _mixed(
-        _texel(scene, row, first, wide, high, i, j), _texel(scene, row, first, wide, high, i + 1, j), s
-    )
+    lower = _mixed(_texel(scene, row, first, wide, high, i, j), _texel(scene, row, first, wide, high, i + 1, j), s)
     upper = _mixed(
         _texel(scene, row, first, wide, high, i, j + 1), _texel(scene, row, first, wide, high, i + 1, j + 1), s
     )

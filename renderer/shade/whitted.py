@@ -202,8 +202,8 @@ def _put_change(scene, bundle, scratch, i, together, inside, m):
 
 @inlined
 def _put_look(scene, bundle, scratch, i, together, look):
-    """Write what ray ``i`` sees where it hits several faces together, and its ambient light, to ``scratch``. Returns the
-    row of its material, see ``LookWays.row``.
+    """Write what ray ``i`` sees where it hits several faces together, and its ambient light, to ``scratch``. Returns
+    the row of its material, see ``LookWays.row``.
     """
     surface, d = offset(scratch.surfaces, i * SURFACE_DOUBLES), row3(bundle.directions, i)
     width = load(bundle.widths, i) + scene.spread * load(scratch.found.t, i)
