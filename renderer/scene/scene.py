@@ -26,6 +26,7 @@ from renderer.mesh.mesh import Mesh
 from renderer.scene.camera import Camera, sample_offsets
 from renderer.scene.cameras.base import BaseCamera
 from renderer.scene.fields import Color, Fields, FiniteVector, Keys, SceneWarning, first_fault, shown, stated, thrice
+from renderer.scene.file_material import Part, not_shown, parts_of_file
 from renderer.scene.instance import Instance
 from renderer.scene.light import DirectionalLight, Light, PointLight
 from renderer.scene.material import Material
@@ -547,7 +548,58 @@ def load_scene(path: FilePaths, *, up: Literal["x", "y", "z"] | None = None) -> 
     table = _table(files[0])
     for entry in _mesh_entries(table):
         entry["mesh"] = files[0].parent / entry["mesh"]
-    return _checked(table, str(files[0]))
+    for material in _material_entries(table):
+        for key in [key for key in material if key.endswith("_map")]:
+            material[key] = _beside(material[key], files[0].parent)
+    return _checked(_with_own_materials(table, str(files[0]), {}), str(files[0]))
+
+
+def _material_entries(table: dict[str, Any]) -> list[dict[str, Any]]:
+    """The entries of materials in a scene file's table."""
+    entries = table.get("materials")
+    return [entry for entry in entries.values() if isinstance(entry, dict)] if isinstance(entries, dict) else []
+
+
+def _beside(texture: Any, folder: Path) -> Any:
+    """A texture of a scene file, whose image is beside the file."""
+    if isinstance(texture, dict) and isinstance(texture.get("image"), str):
+        return {**texture, "image": folder / texture["image"]}
+    return folder / texture if isinstance(texture, str) else texture
+
+
+def _with_own_materials(table: dict[str, Any], where: str, files: Mapping[int, Path]) -> dict[str, Any]:
+    """The table with an object for each material of a mesh whose entry names none, and with these materials. ``files``
+    has the files of meshes, by their identity.
+    """
+    entries = table.get("objects")
+    if not isinstance(entries, list) or all(not isinstance(e, dict) or "material" in e for e in entries):
+        return table
+    materials, objects = dict(table.get("materials") or {}), list[Any]()
+    for entry in entries:
+        if not isinstance(entry, dict) or "material" in entry or not isinstance(entry.get("mesh"), Path | Mesh):
+            objects.append(entry)
+            continue
+        for part in _parts_of_entry(entry, where, files):
+            materials.setdefault(part.name, part.material)
+            objects.append({**entry, "mesh": part.mesh, "material": part.name})
+    return {**table, "materials": materials, "objects": objects}
+
+
+def _parts_of_entry(entry: dict[str, Any], where: str, files: Mapping[int, Path]) -> list[Part]:
+    """The parts of the mesh of an object that names no material."""
+    file = entry["mesh"]
+    try:
+        mesh = load_mesh(file) if isinstance(file, Path) else file
+        left_out = not_shown(mesh)
+        if left_out:
+            warnings.warn(
+                f"{where}: pictures do not show {', '.join(left_out)} of {mesh.name}", SceneWarning, stacklevel=5
+            )
+        linear = mesh_suffix(files.get(id(file), file)) in (".glb", ".gltf")
+        smooth = entry.get("normals") == "smooth"
+        return parts_of_file(mesh, "linear" if linear else "srgb", smooth, float(entry.get("crease", 180.0)))
+    except MeshError as error:
+        raise SceneError(f"{where}: objects: {' '.join(str(error).split())}") from None
 
 
 def scene_files(path: FilePaths) -> list[Path]:
@@ -572,7 +624,8 @@ def _around(files: list[Path], up: str | None) -> Scene:
     table = tomllib.loads(showcase_text(meshes, ["model"] * len(meshes), _up_of_mesh(up)))
     for entry, mesh in zip(table["objects"], meshes, strict=True):
         entry["mesh"] = mesh
-    return _checked(table, ", ".join(map(str, files)))
+    where, of = ", ".join(map(str, files)), {id(mesh): file for mesh, file in zip(meshes, files, strict=True)}
+    return _checked(_with_own_materials(table, where, of), where)
 
 
 def _up_of_mesh(up: str | None) -> str:

@@ -74,7 +74,7 @@ samples = 4
 glass_shadows = "clear"
 terminator = "soft"
 
-{"".join(_object(path, moved) for path in quoted)}[floor]
+{"".join(_object(path, moved, _has_looks(mesh)) for path, mesh in zip(quoted, meshes, strict=True))}[floor]
 min = {_list((-half, -half))}
 max = {_list((half, half))}
 materials = ["floor"]
@@ -97,11 +97,16 @@ sun_irradiance = {_SUN_IRRADIANCE}
 """
 
 
-def _object(path: str, moved: Iterable[float]) -> str:
+def _has_looks(mesh: Mesh) -> bool:
+    """Whether a mesh brings colours or materials, with which it is shown."""
+    return mesh.colors is not None or bool(mesh.materials)
+
+
+def _object(path: str, moved: Iterable[float], has_looks: bool) -> str:
+    material = "" if has_looks else 'material = "model"\n'
     return f"""[[objects]]
 mesh = {path}
-material = "model"
-normals = "smooth"
+{material}normals = "smooth"
 crease = {_CREASE}
 translate = {_list(moved)}
 

@@ -1,0 +1,131 @@
+"""The looks that a mesh file gives its faces, as materials of scenes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from renderer.mesh.material import MeshMaterial
+from renderer.mesh.mesh import Mesh
+from renderer.mesh.texture import Texture
+from renderer.mesh.texture_image import TextureImage
+from renderer.scene.material import Dielectric, Material, Phong
+
+Space = Literal["linear", "srgb"]
+
+# Light that a surface of glass or plastic mirrors straight on, of an index of refraction of 1.5.
+_STRAIGHT = 0.04
+# Rougher surfaces mirror no picture; and the largest exponent of highlights.
+_BLURRED, _SHARPEST = 0.25, 10_000.0
+# What of a file's material pictures do not show.
+_NOT_SHOWN = ("occlusion_texture", "bump_texture")
+
+
+class Part(NamedTuple):
+    """The faces of a mesh with one material: a mesh of their own, and the material with its name."""
+
+    mesh: Mesh
+    name: str
+    material: Material
+
+
+def parts_of_file(mesh: Mesh, space: Space, smooth: bool, crease: float) -> list[Part]:
+    """The parts of a mesh by its own materials, in their order, faces without a material first.
+
+    ``space`` is that of the colours of vertices. Normals of ``smooth`` parts are those of the whole.
+    """
+    colors = space if mesh.colors is not None else None
+    rows = np.full(len(mesh.faces), -1) if mesh.face_materials is None else mesh.face_materials
+    present = np.unique(rows).tolist() or [-1]
+    whole = mesh.creased(crease) if smooth and mesh.normals is None and len(present) > 1 else mesh
+    parts = []
+    for row in present:
+        own = mesh.materials[row] if row >= 0 else None
+        name = f"{mesh.name or 'mesh'}: {own.name or row}" if own else f"{mesh.name or 'mesh'}: plain"
+        part = whole if len(present) == 1 else _of_faces(whole, rows == row)
+        look = material_of(own, colors) if own else Phong(diffuse=1.0 if colors else 0.8, vertex_colors=colors)
+        parts.append(Part(part, name, look))
+    return parts
+
+
+def not_shown(mesh: Mesh) -> list[str]:
+    """The names of what the materials of a mesh have and pictures do not show."""
+    found = {name for material in mesh.materials for name in material.textures if name in _NOT_SHOWN}
+    return sorted(name.removesuffix("_texture") for name in found)
+
+
+def _of_faces(mesh: Mesh, chosen: Any) -> Mesh:
+    """The mesh of some faces, with their vertices alone."""
+    used, faces = np.unique(mesh.faces[chosen], return_inverse=True)
+    normals, colors, texcoords = (None if a is None else a[used] for a in (mesh.normals, mesh.colors, mesh.texcoords))
+    return Mesh(mesh.vertices[used], faces.reshape(-1, 3), normals, colors, texcoords, mesh.name)
+
+
+def material_of(own: MeshMaterial, colors: Space | None = None) -> Material:
+    """The material of a scene that comes nearest to one of a file; ``colors`` of vertices multiply its base colour.
+
+    Metal has no diffuse share, and mirrors in its base colour; other surfaces mirror 0.04. Highlights have the exponent
+    2 / roughness^4 - 2, and the height at which they return as much light. Surfaces smoother than 0.25 also mirror what
+    is around. Textures of metal and roughness count by their means. What transmits at least half is glass.
+    """
+    shared: dict[str, Any] = {"normal_map": own.normal_texture, "vertex_colors": colors, **_opacity(own)}
+    base, texture = own.base_color, own.base_color_texture
+    if own.unlit:
+        return Phong(diffuse=0.0, emission=base, emission_map=texture, **shared)
+    metallic, roughness = _means(own)
+    if own.transmission >= 0.5:
+        return Dielectric(ior=own.ior, transmittance=np.multiply(own.transmission_color, own.transmission))
+    straight = _STRAIGHT + (np.array(base) - _STRAIGHT) * metallic
+    exponent = min(max(2.0 / max(roughness, 0.01) ** 4 - 2.0, 0.0), _SHARPEST)
+    specular = np.minimum(straight * (exponent + 2.0) / 2.0, 1.0)
+    mirrored = straight * max(1.0 - roughness / _BLURRED, 0.0)
+    if own.specular is not None:
+        specular = np.minimum(own.specular, 1.0)
+        exponent = 32.0 if own.shininess is None else own.shininess
+        mirrored = specular if own.mirror else np.zeros(3)
+    return Phong(
+        diffuse=np.multiply(base, (1.0 - metallic) * (1.0 - own.transmission)),
+        diffuse_map=texture,
+        specular=specular,
+        specular_map=own.specular_texture if own.specular is not None else None,
+        shininess=exponent,
+        reflectance=np.minimum(mirrored, 1.0),
+        transmittance=np.multiply(own.transmission_color, own.transmission),
+        ior=own.ior,
+        emission=own.emissive,
+        emission_map=own.emissive_texture,
+        **shared,
+    )
+
+
+def _means(own: MeshMaterial) -> tuple[float, float]:
+    """Metal and roughness, of a texture the means."""
+    texture = own.metallic_roughness_texture
+    if texture is None or texture.image.pixels.shape[2] < 3:
+        return own.metallic, own.roughness
+    pixels = texture.image.pixels
+    most = 1.0 if pixels.dtype.kind == "f" else float(np.iinfo(pixels.dtype).max)
+    green, blue = (float(pixels[..., channel].mean(dtype=np.float64)) / most for channel in (1, 2))
+    return own.metallic * min(blue, 1.0), own.roughness * min(green, 1.0)
+
+
+def _opacity(own: MeshMaterial) -> dict[str, Any]:
+    """The fields of opacity by the mode of a file's alpha."""
+    if own.alpha_mode == "opaque" or (own.alpha_mode == "mask" and own.alpha_cutoff == 0.0):
+        return {}
+    cutoff = own.alpha_cutoff if own.alpha_mode == "mask" else 0.0
+    return {"opacity": own.alpha, "cutoff": cutoff, "opacity_map": _alpha_map(own)}
+
+
+def _alpha_map(own: MeshMaterial) -> Texture | None:
+    """The texture whose alpha is the opacity."""
+    if own.alpha_texture is not None:
+        pixels = own.alpha_texture.image.pixels
+        if pixels.shape[2] == 3:  # its grey
+            grey = pixels.mean(axis=2) / (1.0 if pixels.dtype.kind == "f" else np.iinfo(pixels.dtype).max)
+            return replace(own.alpha_texture, image=TextureImage(grey.astype(np.float32)))
+        return own.alpha_texture
+    texture = own.base_color_texture
+    return texture if texture is not None and texture.image.pixels.shape[2] in (2, 4) else None
