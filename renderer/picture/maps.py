@@ -115,7 +115,6 @@ def _linear(pixels: NDArray[Any], is_srgb: bool) -> NDArray[np.float32]:
     most = 1.0 if pixels.dtype.kind == "f" else float(np.iinfo(pixels.dtype).max)
     colors = pixels[..., : channels - alpha] / np.float64(most)
     if is_srgb:
-        # rule: decoded-srgb
         colors = linear_of_srgb(colors)
     found[..., :3] = colors
     if alpha:

@@ -157,7 +157,6 @@ def _own_row(scene, spot, look, width, own):
         put3(own, COLORS[k], _tinted(scene, maps, k, three(own, COLORS[k]), patch, tint))
     emission = _tinted(scene, maps, EMITTED, three(scene.maps, maps + EMISSION), patch, tint)
     if load(scene.maps, maps + CUTOFF) == 0.0:
-        # rule: share-that-is-there
         opacity = _opacity(scene, maps, patch)
         for k in range(EMITTED):
             put3(own, COLORS[k], scale(three(own, COLORS[k]), opacity))
@@ -182,7 +181,6 @@ def _mapped_normal(scene, spot, look, width):
     r, g, b, _ = _texture(scene, number, _patch_at(scene, at, spot.u, spot.v, width, look.facet.double_area))
     strength = load(scene.textures, number * TEXTURE_COLUMNS + STRENGTH)
     x, y, z = strength * (2.0 * r - 1.0), strength * (2.0 * g - 1.0), 2.0 * b - 1.0
-    # rule: turned-by-map
     return normalized(add(add(scale(along, x), scale(other, y)), scale(n, z)))
 
 

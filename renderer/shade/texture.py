@@ -116,7 +116,6 @@ def _nearest(scene, row, first, wide, high, x, y):
 @kernel
 def _between_four(scene, row, first, wide, high, x, y):
     """The value at a place from the four texels around it."""
-    # rule: texel-centres
     x, y = x * wide - 0.5, y * high - 0.5
     left, low = np.floor(x), np.floor(y)
     i, j, s, t = np.int64(left), np.int64(low), x - left, y - low
