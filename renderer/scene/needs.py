@@ -68,7 +68,7 @@ class Features:
     lights: int
     float64_vertices: bool
     octree: bool
-    textures: bool
+    textures: bool = False
 
 
 # The public name.

@@ -14,6 +14,7 @@ from renderer.picture.prepare import PreparedScene, build_octree, prepare_scene,
 from renderer.precompile import touch_viewing
 from renderer.scene.change import surroundings
 from renderer.scene.hide import is_side, object_names, without
+from renderer.scene.material import Material, Phong
 from renderer.scene.needs import Features, needs_of
 from renderer.scene.scene import RenderSettings, Scene, load_scene, mesh_files
 from renderer.scene.vectors import unit
@@ -27,6 +28,8 @@ from renderer.viewer.viewpoint import page_camera
 
 # The most bytes of a file that may be a saved camera alone: the viewer writes some 300, and 150 for each light.
 _CAMERA_BYTES = 16384
+# Fields of materials that the page does not show.
+_UNSEEN = ("emission", "opacity", "cutoff", "vertex_colors")
 
 
 class _Mark(NamedTuple):
@@ -201,8 +204,18 @@ def edited(scene: Scene, edits: Edits) -> Scene:
         expect(name in scene.materials, "edits.materials", f"names among {sorted(scene.materials)}", repr(name))
     lights = scene.lights if edits.lights is None else edits.lights
     changes = surroundings(edits.ambient, edits.background, edits.sky)
-    changes |= {"materials": {**scene.materials, **edits.materials}, "lights": lights}
+    materials = {name: _with_maps(scene.materials[name], material) for name, material in edits.materials.items()}
+    changes |= {"materials": {**scene.materials, **materials}, "lights": lights}
     return scene.altered(**changes)
+
+
+def _with_maps(own: Material, material: Material) -> Material:
+    """An edited material with what the page neither shows nor may change: it names no files to read."""
+    if not isinstance(material, Phong):
+        return material
+    names = [name for name in Phong.model_fields if name.endswith("_map") or name in _UNSEEN]
+    kept = own if isinstance(own, Phong) else Phong()
+    return material.model_copy(update={name: getattr(kept, name) for name in names})
 
 
 def _edited(prepared: PreparedScene, edits: Edits) -> PreparedScene:

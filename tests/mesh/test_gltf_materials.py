@@ -126,10 +126,10 @@ def test_images_are_in_buffers_texts_or_files(where: str, tmp_path: Path) -> Non
 @cases(
     ("sampler", "wrap", "filter"),
     [
-        (None, ("repeat", "repeat"), "linear"),
-        ({}, ("repeat", "repeat"), "linear"),
+        (None, ("repeat", "repeat"), "mipmap"),
+        ({}, ("repeat", "repeat"), "mipmap"),
         ({"wrapS": 33071, "wrapT": 33648, "magFilter": 9728}, ("clamp", "mirror"), "nearest"),
-        ({"wrapS": 10497, "magFilter": 9729, "minFilter": 9987}, ("repeat", "repeat"), "linear"),
+        ({"wrapS": 10497, "magFilter": 9729, "minFilter": 9987}, ("repeat", "repeat"), "mipmap"),
     ],
 )
 def test_samplers_say_what_is_beyond_and_between_pixels(sampler: Any, wrap: Any, filter: str) -> None:

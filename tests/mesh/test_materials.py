@@ -111,7 +111,7 @@ def test_bad_fields_of_a_material_are_named(fields: dict[str, Any], message: str
         ({"transform": [[1, 0, np.inf], [0, 1, 0]]}, "transform: expected 2x3 finite numbers, got"),
         ({"wrap": "repeat"}, "wrap: expected two of repeat, mirror, clamp, got 'repeat'"),
         ({"wrap": ("repeat", "tile")}, "wrap: expected two of repeat, mirror, clamp, got"),
-        ({"filter": "cubic"}, "filter: expected 'linear' or 'nearest', got 'cubic'"),
+        ({"filter": "cubic"}, "filter: expected 'mipmap', 'linear' or 'nearest', got 'cubic'"),
         ({"strength": None}, "strength: expected real numbers, got"),
     ],
 )

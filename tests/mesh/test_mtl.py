@@ -94,7 +94,7 @@ def test_options_of_maps_are_read_and_are_no_part_of_the_name(statement: str, fi
     (texture,) = found["m"].textures.values()
     assert list(found["m"].textures) == [field] and left_out == [] and len(names) == 1
     assert names[0] == statement.rpartition(" ")[2] or names == ["a b.png"]
-    for key, value in {"wrap": ("repeat", "repeat"), "strength": 1.0, "filter": "linear", **expected}.items():
+    for key, value in {"wrap": ("repeat", "repeat"), "strength": 1.0, "filter": "mipmap", **expected}.items():
         assert getattr(texture, key) == value
 
 

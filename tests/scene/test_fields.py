@@ -26,6 +26,7 @@ from renderer import (
     SceneError,
     SceneObject,
     Sky,
+    Texture,
     ThinLensCamera,
     load_scene,
 )
@@ -60,7 +61,12 @@ pytestmark = [pytest.mark.filterwarnings("ignore::renderer.SceneWarning"), pytes
     "scene.materials.dielectric.type", "scene.materials.mirror.reflectance", "scene.materials.mirror.type",
     "scene.materials.phong.ambient", "scene.materials.phong.diffuse", "scene.materials.phong.ior",
     "scene.materials.phong.reflectance", "scene.materials.phong.shininess", "scene.materials.phong.specular",
-    "scene.materials.phong.transmittance", "scene.materials.phong.type", "scene.objects", "scene.objects.material",
+    "scene.materials.phong.transmittance", "scene.materials.phong.type", "scene.materials.phong.emission",
+    "scene.materials.phong.opacity", "scene.materials.phong.cutoff", "scene.materials.phong.diffuse_map",
+    "scene.materials.phong.specular_map", "scene.materials.phong.reflectance_map",
+    "scene.materials.phong.transmittance_map", "scene.materials.phong.emission_map",
+    "scene.materials.phong.opacity_map", "scene.materials.phong.normal_map",
+    "scene.materials.phong.vertex_colors", "scene.objects", "scene.objects.material",
     "scene.objects.mesh", "scene.objects.normals", "scene.objects.rotate", "scene.objects.scale",
     "scene.objects.translate", "scene.render", "scene.render.max_depth", "scene.render.max_rays",
     "scene.render.min_weight", "scene.render.resolution", "scene.render.samples", "scene.render.shadows",
@@ -70,7 +76,7 @@ pytestmark = [pytest.mark.filterwarnings("ignore::renderer.SceneWarning"), pytes
 )]  # fmt: skip
 
 
-BOX = box()
+BOX, WOOD = box(), Texture("w.png")
 NEEDED = object()
 FILM = {"eye": (0, 0, 5), "target": (0, 0, 0), "width": 64, "height": 48, "fx": 50, "fy": 50}
 # For each class the fields without which it cannot be.
@@ -136,6 +142,19 @@ def kind(name: str) -> Field:
     return Field(name, same(name), ["other", "", None, 1])
 
 
+MAPS = (
+    "diffuse_map",
+    "specular_map",
+    "reflectance_map",
+    "transmittance_map",
+    "emission_map",
+    "opacity_map",
+    "normal_map",
+)
+MAP = Field(
+    None, [(None, None), (WOOD, WOOD), ("w.png", WOOD), ({"image": "w.png"}, WOOD)],
+    [3, True, {"image": "w.png", "filter": "cubic"}, {"filter": "linear"}],
+)  # fmt: skip
 IOR = number(1.5, TINY, HUGE, refused=(0.0, -1.0, BEYOND))
 ANY_EYE = triple(NEEDED, (0, 0, math.nextafter(2.0**126, BEYOND)))
 CAMERA = {
@@ -189,6 +208,9 @@ FIELDS: dict[type, dict[str, Field]] = {
         "ambient": colour(None)._replace(takes=[*colour(None).takes, (None, None)]),
         "shininess": number(32.0, 0.0, HUGE, refused=(-TINY, BEYOND)), "ior": IOR,
         "reflectance": colour((0.0, 0.0, 0.0)), "transmittance": colour((0.0, 0.0, 0.0)),
+        "emission": colour((0.0, 0.0, 0.0)), "opacity": number(1.0, 0.0, 1.0, refused=(-TINY, 1.1)),
+        "cutoff": number(0.0, 0.0, 1.0, refused=(-TINY, 1.1)), **dict.fromkeys(MAPS, MAP),
+        "vertex_colors": Field(None, same(None, "linear", "srgb"), ["sRGB", True, 3]),
     },
     Mirror: {"type": kind("mirror"), "reflectance": colour((1.0, 1.0, 1.0))},
     Dielectric: {
