@@ -10,13 +10,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomlkit
+from PIL import Image as Pillow
 
 from renderer import (
     DirectionalLight,
     EquirectangularCamera,
     FisheyeCamera,
     Image,
+    Mesh,
     OpenCVFisheyeCamera,
     OrthographicCamera,
     PerspectiveCamera,
@@ -94,7 +97,9 @@ OTHERS: dict[type[Fields], Table] = {
     EquirectangularCamera: {"type": PERSPECTIVE, **_PLACE},
     ThinLensCamera: {"type": PERSPECTIVE, **_PLACE, "fov": 50.0, "aperture": 0.8, "focus": 1.5},
     Phong: {"type": _GLASS, "diffuse": [0.9, 0.1, 0.4], "ambient": [0.9, 0.7, 0.2], "specular": [0.9, 0.1, 0.7],
-            "shininess": 40.0, "reflectance": [0.6, 0.5, 0.1], "transmittance": [0.8, 0.1, 0.2], "ior": 1.7},
+            "shininess": 40.0, "reflectance": [0.6, 0.5, 0.1], "transmittance": [0.8, 0.1, 0.2], "ior": 1.7,
+            "emission": [0.2, 0.4, 0.1], "opacity": 0.4, "cutoff": 0.5, "vertex_colors": "srgb",
+            **{name: "spots.png" for name in Phong.model_fields if name.endswith("_map")}},
     Mirror: {"type": _CHALK, "reflectance": [0.3, 0.9, 0.4]},
     Dielectric: {"type": _CHALK, "ior": 1.9, "reflectance": [0.5, 0.9, 0.2], "transmittance": [0.9, 0.3, 0.5]},
     DirectionalLight: {"type": _LAMP, "direction": [0.7, -0.9, -0.2], "irradiance": [0.9, 0.2, 0.4]},
@@ -142,7 +147,10 @@ class Variation:
 def write_meshes(folder: Path) -> None:
     """The meshes that the scene names, and another one."""
     for name, mesh in {"ball": icosphere(1), "cube": box(), "other": icosphere(0)}.items():
-        save_ply(mesh, folder / f"{name}.ply")
+        xyz = mesh.vertices
+        save_ply(Mesh(xyz, mesh.faces, colors=np.abs(xyz) % 1.0, texcoords=xyz[:, :2]), folder / f"{name}.ply")
+    spots = np.random.default_rng(1).integers(0, 256, (4, 4, 4), np.uint8)
+    Pillow.fromarray(spots).save(folder / "spots.png")
 
 
 def scene_of(folder: Path, table: Table) -> Scene:
@@ -180,6 +188,10 @@ def _where_seen(table: Table, keys: Keys, name: str) -> Table:
         table["objects"][keys[1]]["normals"] = "smooth"
     if name == "terminator":
         table["objects"][0]["normals"] = "smooth"
+    if name == "cutoff":
+        table["materials"][keys[1]]["opacity"] = 0.4
+    if name == "vertex_colors":  # which a floor has not
+        table["objects"][0]["material"], table["floor"]["materials"] = keys[1], ["steel"]
     if name == "sky":
         del table["background"]
     return table

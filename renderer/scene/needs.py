@@ -68,7 +68,7 @@ class Features:
     lights: int
     float64_vertices: bool
     octree: bool
-    textures: bool = False
+    textures: bool
 
 
 # The public name.

@@ -266,7 +266,8 @@ class SceneObject(Fields):
 class Floor(Fields):
     """A rectangle of the ground, tiled with its materials in turn.
 
-    It lies at height 0: in the plane y = 0, or x = 0 or z = 0 where the scene has this axis ``up``.
+    It lies at height 0: in the plane y = 0, or x = 0 or z = 0 where the scene has this axis ``up``. Each tile shows the
+    whole image of a texture.
 
     Parameters
     ----------
@@ -743,11 +744,14 @@ def _floor_meshes(floor: Floor, up: int) -> list[tuple[Mesh, str]]:
     b = np.linspace(floor.min[1], floor.max[1], rows + 1)
     vertices = np.zeros((rows + 1, columns + 1, 3))
     vertices[..., first], vertices[..., second] = a, b[:, None]
+    texcoords = np.stack(np.meshgrid(np.arange(columns + 1.0), np.arange(rows + 1.0)), axis=2)
     row, column = (index.ravel() for index in np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij"))
     corner = row * (columns + 1) + column
     beside, across, above = corner + columns + 1, corner + columns + 2, corner + 1
     faces = np.stack([np.stack([corner, beside, across], 1), np.stack([corner, across, above], 1)], 1)
-    if up != 1:  # x, y and y, z are in the order of a right hand, x, z are not
+    if up == 1:  # x, z are not in the order of a right hand, as x, y and y, z are
+        texcoords[..., 1] = rows - texcoords[..., 1]
+    else:
         faces = faces[..., ::-1]
     # rule: floor-colour
     color = (row + column) % len(floor.materials)
@@ -755,7 +759,8 @@ def _floor_meshes(floor: Floor, up: int) -> list[tuple[Mesh, str]]:
     for index, name in enumerate(floor.materials):
         chosen = faces[color == index].reshape(-1, 3)
         if len(chosen):
-            meshes.append((Mesh(vertices.reshape(-1, 3), chosen.astype(np.int32), name="floor"), name))
+            arrays = vertices.reshape(-1, 3), chosen.astype(np.int32)
+            meshes.append((Mesh(*arrays, texcoords=texcoords.reshape(-1, 2), name="floor"), name))
     return meshes
 
 

@@ -21,7 +21,7 @@ from renderer.shade.surface import SceneArrays
 from renderer.viewer.parts import parts_of
 from renderer.viewer.protocol import MODES
 from renderer.viewer.references import references
-from renderer.viewer.shown import ShownScene
+from renderer.viewer.shown import UNSEEN, ShownScene
 from renderer.viewer.viewpoint import page_camera
 
 MAGIC = 0x4853454D
@@ -126,7 +126,7 @@ def _material(name: str, material: Material) -> dict[str, Any]:
         "type": material.type,
         **{color: row[column : column + 3] for color, column in colors.items()},
         "shininess": row[SHININESS],
-        "fields": material.model_dump(exclude_none=True),
+        "fields": material.model_dump(exclude_none=True, exclude=set(UNSEEN)),
     }
 
 

@@ -29,7 +29,10 @@ from renderer.viewer.viewpoint import page_camera
 # The most bytes of a file that may be a saved camera alone: the viewer writes some 300, and 150 for each light.
 _CAMERA_BYTES = 16384
 # Fields of materials that the page does not show.
-_UNSEEN = ("emission", "opacity", "cutoff", "vertex_colors")
+UNSEEN = (
+    *("emission", "opacity", "cutoff", "vertex_colors"),
+    *(name for name in Phong.model_fields if name.endswith("_map")),
+)
 
 
 class _Mark(NamedTuple):
@@ -213,9 +216,8 @@ def _with_maps(own: Material, material: Material) -> Material:
     """An edited material with what the page neither shows nor may change: it names no files to read."""
     if not isinstance(material, Phong):
         return material
-    names = [name for name in Phong.model_fields if name.endswith("_map") or name in _UNSEEN]
     kept = own if isinstance(own, Phong) else Phong()
-    return material.model_copy(update={name: getattr(kept, name) for name in names})
+    return material.model_copy(update={name: getattr(kept, name) for name in UNSEEN})
 
 
 def _edited(prepared: PreparedScene, edits: Edits) -> PreparedScene:

@@ -507,7 +507,7 @@ BAD_SETTINGS: dict[str, list[Any]] = {
     "max_depth": [-1, 65, 1.5, np.nan, True, "3", 10**40, [3]],
     "min_weight": [-1, 1, np.nan, np.inf, "0", 1j, [0.1], -1e-300],
     "shadows": [0, 1, "true", 1.0, [True]],
-    "needs": [3, "x", {}, Needs, Needs(*[None] * 8), Needs(*[1] * 8), Needs(*[np.nan] * 8)],  # type: ignore[arg-type]
+    "needs": [3, "x", {}, Needs, Needs(*[None] * 9), Needs(*[1] * 9), Needs(*[np.nan] * 9)],  # type: ignore[arg-type]
     "colour": [1],
 }
 

@@ -69,7 +69,7 @@ def assert_same_picture(a: Image, b: Image) -> None:
         assert getattr(a, name).tobytes() == getattr(b, name).tobytes(), name
 
 
-NOTHING = Needs(False, False, False, False, False, 0, False, False)
+NOTHING = Needs(False, False, False, False, False, 0, False, False, False)
 LIT = replace(NOTHING, shadows=True, lights=1)
 FINE = icosphere(0)
 
@@ -199,7 +199,7 @@ def test_what_is_not_needed_takes_no_memory() -> None:
     what = scene(UNLIT, lights=(SUN,), eye=(0.1, 0.2, 0.3))
     _, world = pack(what)
     assert (len(world.normals), len(world.smooth), len(world.lights), len(world.media)) == (0, 0, 0, 0)
-    all_on = Needs(True, True, True, True, True, 1, True, True)
+    all_on = Needs(True, True, True, True, True, 1, True, True, False)
     _, world = pack(what, all_on)
     vertices, faces = len(icosphere(0).vertices), len(icosphere(0).faces)
     assert (len(world.normals), len(world.smooth), len(world.lights)) == (vertices, faces, 1)
@@ -253,7 +253,7 @@ def test_the_tree_is_built_where_it_pays_or_is_asked_for(
 
 def test_info_says_what_is_needed_and_why(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert main(["info", str(SCENES / "stairs.toml")]) == 0
-    lines = capsys.readouterr().out.splitlines()[-8:]
+    lines = capsys.readouterr().out.splitlines()[-9:]
     assert [line[2:18].strip().replace(" ", "_") for line in lines] == [f.name for f in fields(Needs)]
     assert lines[0].endswith(" left out: no material reflects") and lines[5].endswith(" needed: 25 of 25 lights shine")
     needs = needs_of(load_scene(SCENES / "stairs.toml"))
