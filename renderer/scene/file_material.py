@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from renderer.mesh.load import load_mesh, mesh_suffix
 from renderer.mesh.material import MeshMaterial
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.texture import Texture
 from renderer.mesh.texture_image import TextureImage
+from renderer.scene.fields import SceneWarning
 from renderer.scene.material import Dielectric, Material, Phong
 
 Space = Literal["linear", "srgb"]
@@ -29,6 +33,70 @@ class Part(NamedTuple):
     mesh: Mesh
     name: str
     material: Material
+
+
+def space_of(file: Path) -> Space:
+    """The space of colours of vertices in a mesh file: linear in glTF, and sRGB in others."""
+    return "linear" if mesh_suffix(file) in (".glb", ".gltf") else "srgb"
+
+
+def with_own_materials(table: dict[str, Any]) -> dict[str, Any]:
+    """The keywords of a ``Scene`` with an object for each material of a mesh whose object names none, and with these
+    materials. Raises ``MeshError`` for a file that cannot be read.
+
+    A table of an object may have the ``space`` of its mesh.
+    """
+    given = table.get("objects")
+    if not isinstance(given, list | tuple) or all(_has_material(each) for each in given):
+        return table
+    materials, objects, known = dict(table.get("materials") or {}), list[Any](), dict[Any, list[Part]]()
+    for each in given:
+        if _has_material(each):
+            objects.append(each)
+            continue
+        # The fields of an object that was made in Python, or the keys of its table.
+        entry = dict(each) if isinstance(each, dict) else {name: getattr(each, name) for name in each.model_fields_set}
+        space, mesh = entry.pop("space", None), entry["mesh"]
+        # Objects of one mesh share its parts.
+        which = (
+            id(mesh) if isinstance(mesh, Mesh) else Path(mesh),
+            *(repr(entry.get(k)) for k in ("normals", "crease")),
+        )
+        if which not in known:
+            known[which] = [_named_in(materials, part) for part in _parts_of_entry(entry, space)]
+        objects += [{**entry, "mesh": part.mesh, "material": part.name} for part in known[which]]
+    return {**table, "materials": materials, "objects": objects}
+
+
+def _named_in(materials: dict[str, Any], part: Part) -> Part:
+    """The part, whose material is then among ``materials`` by a name that no other has."""
+    name, count = part.name, 1
+    while materials.setdefault(name, part.material) != part.material:
+        count += 1
+        name = f"{part.name} {count}"
+    return part._replace(name=name)
+
+
+def _has_material(entry: Any) -> bool:
+    """Whether an object names a material, or is none at all."""
+    mesh = entry.get("mesh") if isinstance(entry, dict) else getattr(entry, "mesh", None)
+    named = entry.get("material") if isinstance(entry, dict) else getattr(entry, "material", None)
+    return named is not None or not isinstance(mesh, Mesh | Path | str)
+
+
+def _parts_of_entry(entry: dict[str, Any], space: Space | None) -> list[Part]:
+    """The parts of the mesh of an object that names no material."""
+    given = entry["mesh"]
+    mesh = given if isinstance(given, Mesh) else load_mesh(given)
+    if space is None:
+        space = "srgb" if isinstance(given, Mesh) else space_of(Path(given))
+    left_out = not_shown(mesh)
+    if left_out:
+        warnings.warn(f"pictures do not show {', '.join(left_out)} of {mesh.name}", SceneWarning, stacklevel=6)
+    crease = entry.get("crease", 180.0)
+    return parts_of_file(
+        mesh, space, entry.get("normals") == "smooth", crease if isinstance(crease, int | float) else 180.0
+    )
 
 
 def parts_of_file(mesh: Mesh, space: Space, smooth: bool, crease: float) -> list[Part]:

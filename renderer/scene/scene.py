@@ -26,7 +26,7 @@ from renderer.mesh.mesh import Mesh
 from renderer.scene.camera import Camera, sample_offsets
 from renderer.scene.cameras.base import BaseCamera
 from renderer.scene.fields import Color, Fields, FiniteVector, Keys, SceneWarning, first_fault, shown, stated, thrice
-from renderer.scene.file_material import Part, not_shown, parts_of_file
+from renderer.scene.file_material import space_of, with_own_materials
 from renderer.scene.instance import Instance
 from renderer.scene.light import DirectionalLight, Light, PointLight
 from renderer.scene.material import Material
@@ -184,8 +184,8 @@ class SceneObject(Fields):
     ----------
     mesh : Mesh or path
         The mesh, or its file.
-    material : str
-        The name of one of the scene's materials.
+    material : str, optional
+        The name of one of the scene's materials. Without it, ``Scene`` makes an object of each material of the mesh.
     normals : {"flat", "smooth"}, default "flat"
         Whether shading interpolates the normals of vertices: those of the file, or else means of the faces around.
     crease : float, default 180
@@ -217,7 +217,7 @@ class SceneObject(Fields):
     """
 
     mesh: Annotated[Path | Mesh, BeforeValidator(_path_or_mesh)]
-    material: str
+    material: str | None = None
     normals: Literal["flat", "smooth"] = "flat"
     crease: Annotated[float, Field(ge=0.0, le=180.0, strict=True)] = 180.0
     scale: Annotated[FiniteVector, BeforeValidator(thrice)] = (1.0, 1.0, 1.0)
@@ -229,7 +229,7 @@ class SceneObject(Fields):
         self,
         *,
         mesh: Mesh | str | os.PathLike[str],
-        material: str,
+        material: str | None = None,
         normals: Literal["flat", "smooth"] = "flat",
         crease: float = 180.0,
         scale: ArrayLike = 1.0,
@@ -404,6 +404,11 @@ class Scene(Fields):
 
     @model_validator(mode="before")
     @classmethod
+    def _own_materials(cls, values: Any) -> Any:
+        return with_own_materials(values) if isinstance(values, dict) else values
+
+    @model_validator(mode="before")
+    @classmethod
     def _upright(cls, values: Any) -> Any:
         """Let a camera that has no ``up`` of its own have the scene's."""
         if not isinstance(values, dict) or values.get("up") not in ("x", "z"):
@@ -552,7 +557,7 @@ def load_scene(path: FilePaths, *, up: Literal["x", "y", "z"] | None = None) -> 
     for material in _material_entries(table):
         for key in [key for key in material if key.endswith("_map")]:
             material[key] = _beside(material[key], files[0].parent)
-    return _checked(_with_own_materials(table, str(files[0]), {}), str(files[0]))
+    return _checked(table, str(files[0]))
 
 
 def _material_entries(table: dict[str, Any]) -> list[dict[str, Any]]:
@@ -566,41 +571,6 @@ def _beside(texture: Any, folder: Path) -> Any:
     if isinstance(texture, dict) and isinstance(texture.get("image"), str):
         return {**texture, "image": folder / texture["image"]}
     return folder / texture if isinstance(texture, str) else texture
-
-
-def _with_own_materials(table: dict[str, Any], where: str, files: Mapping[int, Path]) -> dict[str, Any]:
-    """The table with an object for each material of a mesh whose entry names none, and with these materials. ``files``
-    has the files of meshes, by their identity.
-    """
-    entries = table.get("objects")
-    if not isinstance(entries, list) or all(not isinstance(e, dict) or "material" in e for e in entries):
-        return table
-    materials, objects = dict(table.get("materials") or {}), list[Any]()
-    for entry in entries:
-        if not isinstance(entry, dict) or "material" in entry or not isinstance(entry.get("mesh"), Path | Mesh):
-            objects.append(entry)
-            continue
-        for part in _parts_of_entry(entry, where, files):
-            materials.setdefault(part.name, part.material)
-            objects.append({**entry, "mesh": part.mesh, "material": part.name})
-    return {**table, "materials": materials, "objects": objects}
-
-
-def _parts_of_entry(entry: dict[str, Any], where: str, files: Mapping[int, Path]) -> list[Part]:
-    """The parts of the mesh of an object that names no material."""
-    file = entry["mesh"]
-    try:
-        mesh = load_mesh(file) if isinstance(file, Path) else file
-        left_out = not_shown(mesh)
-        if left_out:
-            warnings.warn(
-                f"{where}: pictures do not show {', '.join(left_out)} of {mesh.name}", SceneWarning, stacklevel=5
-            )
-        linear = mesh_suffix(files.get(id(file), file)) in (".glb", ".gltf")
-        smooth = entry.get("normals") == "smooth"
-        return parts_of_file(mesh, "linear" if linear else "srgb", smooth, float(entry.get("crease", 180.0)))
-    except MeshError as error:
-        raise SceneError(f"{where}: objects: {' '.join(str(error).split())}") from None
 
 
 def scene_files(path: FilePaths) -> list[Path]:
@@ -623,10 +593,9 @@ def _around(files: list[Path], up: str | None) -> Scene:
         kind = NoSuchSceneError if isinstance(error, FileNotFoundError) else SceneError
         raise kind(str(error)) from None
     table = tomllib.loads(showcase_text(meshes, ["model"] * len(meshes), _up_of_mesh(up)))
-    for entry, mesh in zip(table["objects"], meshes, strict=True):
-        entry["mesh"] = mesh
-    where, of = ", ".join(map(str, files)), {id(mesh): file for mesh, file in zip(meshes, files, strict=True)}
-    return _checked(_with_own_materials(table, where, of), where)
+    for entry, mesh, file in zip(table["objects"], meshes, files, strict=True):
+        entry |= {"mesh": mesh} | ({} if "material" in entry else {"space": space_of(file)})
+    return _checked(with_own_materials(table), ", ".join(map(str, files)))
 
 
 def _up_of_mesh(up: str | None) -> str:
@@ -724,7 +693,7 @@ def warn_of_slips(camera: Camera | None, materials: Mapping[str, Material], wher
 
 
 def _instance(of: SceneObject, mesh: Mesh) -> Instance:
-    return Instance(mesh, of.material, of.normals == "smooth", of.matrix(), of.crease)
+    return Instance(mesh, of.material or "", of.normals == "smooth", of.matrix(), of.crease)
 
 
 def _rotation(axis: int, degrees: float) -> NDArray[np.float64]:

@@ -65,7 +65,7 @@ KINDS: dict[str, tuple[type, Place, dict[str, Any]]] = {
     "[materials.NAME], dielectric": (Dielectric, ("materials", "NAME"), {"type": "dielectric"}),
     "[[lights]], directional": (DirectionalLight, ("lights", 0), {"type": "directional", "direction": [0, -1, 0]}),
     "[[lights]], point": (PointLight, ("lights", 0), {"type": "point", "position": [0, 1, 0]}),
-    "[[objects]]": (SceneObject, ("objects", 0), {"mesh": box(), "material": "NAME"}),
+    "[[objects]]": (SceneObject, ("objects", 0), {"mesh": box()}),
     "[sky]": (Sky, ("sky",), {}),
     "[floor]": (Floor, ("floor",), {"min": [0, 0], "max": [1, 1], "materials": ["NAME"]}),
 }
@@ -76,6 +76,7 @@ WORDS: dict[str, Any] = {
     "half the height": (24.0,),
     "as `diffuse`": (None,),
     "as `horizon`": (None,),
+    "those of the mesh": ("box: plain",),
     "all defaults": (RenderSettings(),),
 }
 

@@ -93,7 +93,7 @@ LEAST: dict[type, dict[str, Any]] = {
     Phong: {},
     Mirror: {},
     Dielectric: {},
-    SceneObject: {"mesh": BOX, "material": "m"},
+    SceneObject: {"mesh": BOX},
     Floor: {"min": (-1, -1), "max": (1, 1), "materials": ("m",)},
     RenderSettings: {},
     Sky: {},
@@ -219,7 +219,7 @@ FIELDS: dict[type, dict[str, Field]] = {
     },
     SceneObject: {
         "mesh": Field(NEEDED, [(BOX, BOX), ("a.ply", Path("a.ply")), (Path("b.stl"), Path("b.stl"))], [3, None, [BOX]]),
-        "material": Field(NEEDED, same("m", "ü b"), [3, None, ["m"]]),
+        "material": Field(None, same("m", "ü b", None), [3, ["m"]]),
         "crease": number(180.0, 0.0, 180.0, refused=(-TINY, math.nextafter(180, BEYOND), BEYOND)),
         "normals": Field("flat", same("flat", "smooth"), ["Flat", "", None, True]),
         "scale": triple((1.0, 1.0, 1.0))._replace(
@@ -275,7 +275,7 @@ FIELDS: dict[type, dict[str, Field]] = {
         ], [3, None, {}, [3], [{"position": (0, 1, 0)}], [{"type": "spot", "position": (0, 1, 0)}], [Phong()]]),
         "objects": Field((), [
             ([], ()), ([{"mesh": BOX, "material": "n"}], (SceneObject(mesh=BOX, material="n"),)),
-        ], [3, None, {}, [3], [{"mesh": BOX}], [{"mesh": BOX, "material": "gold"}]]),
+        ], [3, None, {}, [3], [{"material": "n"}], [{"mesh": BOX, "material": "gold"}]]),
         "floor": Field(None, [
             (None, None), (LEAST[Floor], Floor(**LEAST[Floor])),
         ], [3, [], {}, {**LEAST[Floor], "materials": ["gold"]}]),

@@ -10,8 +10,11 @@ from renderer import (
     Dielectric,
     Mesh,
     MeshMaterial,
+    PerspectiveCamera,
     Phong,
+    Scene,
     SceneError,
+    SceneObject,
     SceneWarning,
     Texture,
     load_scene,
@@ -119,3 +122,19 @@ def test_colours_of_vertices_are_shown_as_srgb(tmp_path: Path) -> None:
     Mesh(cube.vertices, cube.faces, colors=np.full((8, 3), 0.5)).save(tmp_path / "a.ply")
     (material,) = (m for name, m in load_scene(tmp_path / "a.ply").materials.items() if name.startswith("a"))
     assert isinstance(material, Phong) and (material.vertex_colors, material.diffuse) == ("srgb", (1.0, 1.0, 1.0))
+
+
+def test_objects_in_python_have_the_materials_of_their_meshes_which_share_no_names() -> None:
+    red, blue = (
+        Mesh(
+            box().vertices,
+            box().faces,
+            materials=[MeshMaterial("paint", base_color=color)],
+            face_materials=np.zeros(12, int),
+        )
+        for color in ((1, 0, 0), (0, 0, 1))
+    )
+    thrice = [SceneObject(mesh=red), SceneObject(mesh=blue, translate=(0, 0, 2)), SceneObject(mesh=red, scale=3)]
+    scene = Scene(camera=PerspectiveCamera(eye=(0, 0, 9), target=(0, 0, 0)), materials={}, objects=thrice)
+    assert [scene.materials[of.material].diffuse for of in scene.objects] == [(1, 0, 0), (0, 0, 1), (1, 0, 0)]
+    assert scene.instances[0].source is scene.instances[2].source and scene.objects[2].scale == (3.0, 3.0, 3.0)
