@@ -32,10 +32,10 @@ from renderer.shade.records import (
 
 _WRAPS = {"repeat": REPEAT, "mirror": MIRRORED, "clamp": CLAMP}
 _FILTERS = {"nearest": NEAREST, "linear": LINEAR, "mipmap": MIPMAP}
-# The colours of maps in the order of ``records.COLORS``; ambient light has that of diffuse light.
-_COLOR_MAPS = ("diffuse_map", "diffuse_map", "specular_map", "reflectance_map", "transmittance_map", "emission_map")
+# The maps in the order of ``records.COLORS``, and which colours those of vertices multiply.
+_COLOR_MAPS = ("ambient_map", "diffuse_map", "specular_map", "reflectance_map", "transmittance_map", "emission_map")
 assert len(_COLOR_MAPS) == len(COLORS) + 1
-_TINTED = ("ambient", "diffuse", None, None, None, "emission")
+_TINTED = (True, True, False, False, False, True)
 
 
 class Maps(NamedTuple):
@@ -69,9 +69,9 @@ def _row(material: Material, number: Any) -> NDArray[np.float64]:
     if not isinstance(material, Phong):
         return row
     for k, (name, tinted) in enumerate(zip(_COLOR_MAPS, _TINTED, strict=True)):
-        if k > 0 or material.ambient is None:
-            row[2 * k] = number(getattr(material, name), True)
-            row[2 * k + 1] = float(tinted is not None and material.vertex_colors is not None)
+        diffuse = k == 0 and material.ambient is None
+        row[2 * k] = number(material.diffuse_map if diffuse else getattr(material, name), True)
+        row[2 * k + 1] = float(tinted and (k > 0 or diffuse) and material.vertex_colors is not None)
     row[EMISSION : EMISSION + 3] = material.emission
     row[NORMAL_MAP], row[OPACITY_MAP] = number(material.normal_map, False), number(material.opacity_map, False)
     row[OPACITY], row[CUTOFF] = material.opacity, material.cutoff

@@ -112,7 +112,8 @@ def stated(signature: Callable[Concatenate[Any, Stated], None]) -> Callable[Conc
 
 def _unpacked(value: object) -> object:
     if isinstance(value, np.generic | np.ndarray):
-        return value.tolist()
+        # Those of three axes are images.
+        return value if value.ndim == 3 else value.tolist()
     if isinstance(value, list):
         return [_unpacked(entry) for entry in value]
     return tuple(_unpacked(entry) for entry in value) if type(value) is tuple else value

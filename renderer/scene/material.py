@@ -21,12 +21,13 @@ def _texture(value: Any) -> Any:
     """A texture of what stands for one: an image, or a table of a scene file."""
     if isinstance(value, dict) and "image" in value:
         return Texture(**value)
-    return Texture(value) if isinstance(value, str | os.PathLike | TextureImage) else value
+    return Texture(value) if isinstance(value, str | bytes | os.PathLike | TextureImage | np.ndarray) else value
 
 
+TextureLike = Texture | TextureImage | str | bytes | os.PathLike[str] | NDArray[Any]
 AnyTexture = Annotated[Texture, BeforeValidator(_texture)]
 # Colours that maps multiply.
-_MAPPED = ("diffuse", "specular", "reflectance", "transmittance", "emission")
+_MAPPED = ("ambient", "diffuse", "specular", "reflectance", "transmittance", "emission")
 _Share = Annotated[float, Field(ge=0.0, le=1.0, strict=True)]
 _Ior = Annotated[float, Field(gt=0.0, allow_inf_nan=False, strict=True)]
 _BLACK = (0.0, 0.0, 0.0)
@@ -69,12 +70,15 @@ class Phong(_Material):
         The share of the surface that is there, from 0 to 1. The rest lets light through, unbent.
     cutoff : float, default 0
         If it is above 0, the surface is there where its opacity is at least this, and nowhere else: leaves, fences.
-    diffuse_map, specular_map, reflectance_map, transmittance_map, emission_map : Texture or path, optional
+    ambient_map, diffuse_map, specular_map : Texture or image, optional
         Multiply the colours of these names, which are 1 by default beside them; integers are sRGB, floats linear. That
-        of ``diffuse`` multiplies ``ambient`` too if that has the colour of ``diffuse``.
-    opacity_map : Texture or path, optional
+        of ``diffuse`` multiplies ``ambient`` too if that has the colour of ``diffuse``. An image is a path, bytes or
+        pixels, as ``TextureImage`` takes them.
+    reflectance_map, transmittance_map, emission_map : Texture or image, optional
+        Likewise.
+    opacity_map : Texture or image, optional
         Its alpha multiplies ``opacity``.
-    normal_map : Texture or path, optional
+    normal_map : Texture or image, optional
         Normals in the space of the surface's texture coordinates: 0 to 1 stand for -1 to 1.
     vertex_colors : {"linear", "srgb"}, optional
         The colours of the mesh's vertices multiply those of ``diffuse``, also as ``ambient``, and of ``emission``.
@@ -112,6 +116,7 @@ class Phong(_Material):
     emission: Color = _BLACK
     opacity: _Share = 1.0
     cutoff: _Share = 0.0
+    ambient_map: AnyTexture | None = None
     diffuse_map: AnyTexture | None = None
     specular_map: AnyTexture | None = None
     reflectance_map: AnyTexture | None = None
@@ -144,13 +149,14 @@ class Phong(_Material):
         emission: ArrayLike = 0.0,
         opacity: float = 1.0,
         cutoff: float = 0.0,
-        diffuse_map: Texture | TextureImage | str | os.PathLike[str] | None = None,
-        specular_map: Texture | TextureImage | str | os.PathLike[str] | None = None,
-        reflectance_map: Texture | TextureImage | str | os.PathLike[str] | None = None,
-        transmittance_map: Texture | TextureImage | str | os.PathLike[str] | None = None,
-        emission_map: Texture | TextureImage | str | os.PathLike[str] | None = None,
-        opacity_map: Texture | TextureImage | str | os.PathLike[str] | None = None,
-        normal_map: Texture | TextureImage | str | os.PathLike[str] | None = None,
+        ambient_map: TextureLike | None = None,
+        diffuse_map: TextureLike | None = None,
+        specular_map: TextureLike | None = None,
+        reflectance_map: TextureLike | None = None,
+        transmittance_map: TextureLike | None = None,
+        emission_map: TextureLike | None = None,
+        opacity_map: TextureLike | None = None,
+        normal_map: TextureLike | None = None,
         vertex_colors: Literal["linear", "srgb"] | None = None,
         type: Literal["phong"] = "phong",
     ) -> None: ...

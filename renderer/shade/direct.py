@@ -164,7 +164,7 @@ def _pass_through(tree, scene, scratch, k, rule):
 def _share_through(scene, scratch, spot, d):
     """The share of light from direction d that the surface at a spot transmits."""
     look = look_at(scene, spot.face, spot.u, spot.v, d)
-    row = scene.looks.row(scene, spot, look, 0.0, offset(scratch.own, SIZE * OWN_COLUMNS))
+    row = scene.looks.row(scene, spot, look, d, 0.0, offset(scratch.own, SIZE * OWN_COLUMNS))
     return three(scene.materials, row + TRANSMITTANCE)
 
 

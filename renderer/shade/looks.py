@@ -3,11 +3,10 @@
 Other pictures have kernels without any of this, chosen when they are compiled.
 """
 
-import math
 from typing import Any, NamedTuple
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import doubles_between, load, store
+from renderer.numerics.simd import doubles_between, load, maximum, store
 from renderer.numerics.vec3 import (
     add,
     barycentric,
@@ -37,18 +36,20 @@ from renderer.shade.records import (
     TEXTURE_COLUMNS,
     TRANSMITTANCE,
 )
-from renderer.shade.texture import texture_at
+from renderer.shade.texture import Patch, texture_at
 
 # A material's row at a point, with the emission behind it.
 OWN_COLUMNS = MATERIAL_COLUMNS + 3
+# The least cosine of a ray to a face's normal: at a smaller one an ellipse is as long as at this.
+_GRAZING = 2.0**-10
 
 
 class LookWays(NamedTuple):
     """The kernels by which materials are read.
 
-    row       row(scene, spot, look, width, own): the start of the row that holds for a ``Spot``, seen by a ray of that
-              ``width``, from ``scene.materials`` on; ``own`` has room for OWN_COLUMNS
-    normal    normal(scene, spot, look, width): the shading normal
+    row       row(scene, spot, look, d, width, own): the start of the row that holds for a ``Spot``, seen by a ray of
+              direction d and that ``width``, from ``scene.materials`` on; ``own`` has room for OWN_COLUMNS
+    normal    normal(scene, spot, look, d, width): the shading normal
     glow      glow(scene, row): the ambient light that a row reflects, and what it emits
     is_there  is_there(scene, spot): whether no mask leaves out the surface
     has_holes has_holes(scene): whether there is any mask
@@ -62,12 +63,12 @@ class LookWays(NamedTuple):
 
 
 @inlined
-def _plain_row(scene, spot, look, width, own):
+def _plain_row(scene, spot, look, d, width, own):
     return look.material
 
 
 @inlined
-def _plain_normal(scene, spot, look, width):
+def _plain_normal(scene, spot, look, d, width):
     return look.n_s
 
 
@@ -95,28 +96,33 @@ def _maps_of(material):
     return material // MATERIAL_COLUMNS * MAP_COLUMNS
 
 
-class _Patch(NamedTuple):
-    """Texture coordinates at a point, and the width of what is seen there in their units."""
-
-    u: float
-    v: float
-    width: float
+@inlined
+def _here(scene, at, u, v):
+    """The ``Patch`` of a point alone."""
+    u0, v0, u1, v1, u2, v2 = scene.ways.texcoords(scene, at)
+    w = 1.0 - u - v
+    return Patch(w * u0 + u * u1 + v * u2, w * v0 + u * v1 + v * v2, 0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
-def _patch_at(scene, at, u, v, width, double_area):
-    """The ``_Patch`` at barycentrics u, v of a face, of which a ray sees a ``width`` in the world."""
+def _patch_at(scene, at, u, v, d, width, facet):
+    """The ``Patch`` at barycentrics u, v of a face that a ray of direction d and that ``width`` sees."""
     u0, v0, u1, v1, u2, v2 = scene.ways.texcoords(scene, at)
-    w = 1.0 - u - v
-    area = abs((u1 - u0) * (v2 - v0) - (u2 - u0) * (v1 - v0))
-    # As wide as a square of the same area.
-    wide = width * math.sqrt(area / double_area) if double_area > 0.0 else 0.0
-    return _Patch(w * u0 + u * u1 + v * u2, w * v0 + u * v1 + v * v2, wide)
-
-
-@inlined
-def _texture(scene, number, patch):
-    return texture_at(scene, number, patch.u, patch.v, patch.width)
+    here = _here(scene, at, u, v)
+    if not (width > 0.0 and facet.double_area > 0.0):
+        return here
+    p0, p1, p2 = scene.ways.corners(scene, at)
+    e, f = scale(sub(p1, p0), 1.0 / facet.double_area), scale(sub(p2, p0), 1.0 / facet.double_area)
+    n, facing = facet.normal, dot(d, facet.normal)
+    along = sub(d, scale(n, facing))
+    # Seen straight on, the ellipse is a circle, and any direction is along it.
+    along = normalized(along if largest_component(along) > 1e-9 else e)
+    across = scale(cross(n, along), width)
+    along = scale(along, width / maximum(abs(facing), _GRAZING))
+    a, b = dot(cross(along, f), n), dot(cross(e, along), n)
+    c, g = dot(cross(across, f), n), dot(cross(e, across), n)
+    du, dv, eu, ev = u1 - u0, v1 - v0, u2 - u0, v2 - v0
+    return Patch(here.u, here.v, a * du + b * eu, a * dv + b * ev, c * du + g * eu, c * dv + g * ev)
 
 
 @inlined
@@ -124,7 +130,7 @@ def _tinted(scene, maps, k, color, patch, tint):
     """A colour times what the k-th pair of columns of maps names."""
     texture = load(scene.maps, maps + 2 * k)
     if texture >= 0.0:
-        r, g, b, _ = _texture(scene, int(texture), patch)
+        r, g, b, _ = texture_at(scene, int(texture), patch)
         color = times(color, (r, g, b))
     return times(color, tint) if load(scene.maps, maps + 2 * k + 1) != 0.0 else color
 
@@ -140,13 +146,13 @@ def _has_tints(scene, maps):
 @inlined
 def _opacity(scene, maps, patch):
     opacity, texture = load(scene.maps, maps + OPACITY), load(scene.maps, maps + OPACITY_MAP)
-    return opacity * _texture(scene, int(texture), patch)[3] if texture >= 0.0 else opacity
+    return opacity * texture_at(scene, int(texture), patch)[3] if texture >= 0.0 else opacity
 
 
 @kernel
-def _own_row(scene, spot, look, width, own):
+def _own_row(scene, spot, look, d, width, own):
     at, maps = scene.ways.at(scene, spot.face), _maps_of(look.material)
-    patch = _patch_at(scene, at, spot.u, spot.v, width, look.facet.double_area)
+    patch = _patch_at(scene, at, spot.u, spot.v, d, width, look.facet)
     tint = (1.0, 1.0, 1.0)
     if _has_tints(scene, maps):
         a, b, c = scene.ways.tints(scene, at)
@@ -168,7 +174,7 @@ def _own_row(scene, spot, look, width, own):
 
 
 @kernel
-def _mapped_normal(scene, spot, look, width):
+def _mapped_normal(scene, spot, look, d, width):
     """The shading normal that a texture of normals gives, on the side of the surface from which the ray comes."""
     maps = _maps_of(look.material)
     texture = load(scene.maps, maps + NORMAL_MAP)
@@ -178,7 +184,7 @@ def _mapped_normal(scene, spot, look, width):
     along, other = _tangents(scene, at, n)
     if largest_component(along) == 0.0:
         return n
-    r, g, b, _ = _texture(scene, number, _patch_at(scene, at, spot.u, spot.v, width, look.facet.double_area))
+    r, g, b, _ = texture_at(scene, number, _patch_at(scene, at, spot.u, spot.v, d, width, look.facet))
     strength = load(scene.textures, number * TEXTURE_COLUMNS + STRENGTH)
     x, y, z = strength * (2.0 * r - 1.0), strength * (2.0 * g - 1.0), 2.0 * b - 1.0
     return normalized(add(add(scale(along, x), scale(other, y)), scale(n, z)))
@@ -210,7 +216,7 @@ def _is_there(scene, spot):
     at = scene.ways.at(scene, spot.face)
     maps = _maps_of(load(scene.material, scene.ways.row(scene, at)))
     cutoff = load(scene.maps, maps + CUTOFF)
-    return cutoff == 0.0 or _opacity(scene, maps, _patch_at(scene, at, spot.u, spot.v, 0.0, 1.0)) >= cutoff
+    return cutoff == 0.0 or _opacity(scene, maps, _here(scene, at, spot.u, spot.v)) >= cutoff
 
 
 @inlined

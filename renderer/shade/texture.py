@@ -1,5 +1,8 @@
 """Values of textures: an image at texture coordinates, between its pixels and beyond its edges."""
 
+import math
+from typing import NamedTuple
+
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
@@ -24,32 +27,54 @@ from renderer.shade.records import (
 CHANNELS = 4
 # Coordinates beyond this, in images, are those of its corner: whole numbers of texels end there.
 _FARTHEST = 2.0**31
+# The most means that a MIPMAP takes along an ellipse; one that is longer still blurs the texture.
+_MOST_MEANS = 16
+# An ellipse of more texels shows the mean of the whole image.
+_LONGEST = 2.0**40
+
+
+class Patch(NamedTuple):
+    """Texture coordinates at a point, and around it the axes of an ellipse that a ray sees, in these coordinates."""
+
+    u: float
+    v: float
+    along_u: float
+    along_v: float
+    across_u: float
+    across_v: float
+
+
+class _Level(NamedTuple):
+    """An image or a smaller one of its pyramid: the place of the first texel, and the size."""
+
+    first: int
+    wide: int
+    high: int
 
 
 @kernel
-def texture_at(scene, texture, u, v, footprint):
-    """Red, green, blue and alpha of a texture at texture coordinates.
-
-    ``footprint`` is the width of what a ray sees, in units of the coordinates: a MIPMAP gives the mean over about that.
-    """
+def texture_at(scene, texture, patch):
+    """Red, green, blue and alpha of a texture: at the middle of a ``Patch``, or of a MIPMAP about the mean over it."""
     row = texture * TEXTURE_COLUMNS
-    x, y = _moved(scene.textures, row, u, v)
-    wide, high = np.int64(load(scene.textures, row + ACROSS)), np.int64(load(scene.textures, row + DOWN))
-    filter_, first = load(scene.textures, row + FILTER), np.int64(load(scene.textures, row + TEXEL))
+    x, y = _moved(scene.textures, row, patch.u, patch.v)
+    image = _Level(
+        np.int64(load(scene.textures, row + TEXEL)),
+        np.int64(load(scene.textures, row + ACROSS)),
+        np.int64(load(scene.textures, row + DOWN)),
+    )
+    filter_ = load(scene.textures, row + FILTER)
     if filter_ == NEAREST:
-        return _nearest(scene, row, first, wide, high, x, y)
-    if filter_ != MIPMAP:
-        return _between_four(scene, row, first, wide, high, x, y)
-    # The longer side of a pixel counts: rather blurred than shimmering.
-    pixels = footprint * _stretch(scene.textures, row) * maximum(wide, high)
-    level, share = _level_of(pixels, np.int64(load(scene.textures, row + LEVELS)))
-    for _ in range(level):
-        first, wide, high = first + wide * high, maximum(wide // 2, 1), maximum(high // 2, 1)
-    near = _between_four(scene, row, first, wide, high, x, y)
-    if share == 0.0:
-        return near
-    first, wide, high = first + wide * high, maximum(wide // 2, 1), maximum(high // 2, 1)
-    return _mixed(near, _between_four(scene, row, first, wide, high, x, y), share)
+        return _nearest(scene, row, image, x, y)
+    if filter_ == MIPMAP:
+        along = _turned(scene.textures, row, patch.along_u, patch.along_v)
+        across = _turned(scene.textures, row, patch.across_u, patch.across_v)
+        longer, shorter = _texels(along, image), _texels(across, image)
+        if shorter > longer:
+            along, across, longer = across, along, shorter
+        if longer > 1.0:
+            area = abs(along[0] * across[1] - along[1] * across[0]) * (image.wide * image.high)
+            return _mean(scene, row, image, (x, y), along, longer, area)
+    return _between_four(scene, row, image, x, y)
 
 
 @inlined
@@ -62,27 +87,63 @@ def _moved(textures, row, u, v):
 
 
 @inlined
-def _stretch(textures, row):
-    """The most by which the rows of a texture stretch coordinates, along one of them."""
+def _turned(textures, row, u, v):
     at = row + TRANSFORM
-    a, b = abs(load(textures, at)), abs(load(textures, at + 1))
-    c, d = abs(load(textures, at + 3)), abs(load(textures, at + 4))
-    return maximum(maximum(a, b), maximum(c, d))
+    return (
+        load(textures, at) * u + load(textures, at + 1) * v,
+        load(textures, at + 3) * u + load(textures, at + 4) * v,
+    )
 
 
 @inlined
-def _level_of(pixels, levels):
-    """The finer of two levels whose texels have the width of so many pixels, and the share of the coarser."""
-    if not pixels > 1.0:
+def _texels(axis, image):
+    """The length of an axis in texels."""
+    x, y = axis[0] * image.wide, axis[1] * image.high
+    return math.sqrt(x * x + y * y)
+
+
+@kernel
+def _mean(scene, row, image, middle, along, longer, area):
+    """About the mean over an ellipse: that of several circles on its longer axis, which is above one texel.
+
+    ``longer`` is the length of that axis, and ``area`` that of the ellipse times 4 / pi, in texels.
+    """
+    levels = np.int64(load(scene.textures, row + LEVELS))
+    whole = not longer < _LONGEST
+    # Fewer circles than would fill the ellipse are wider.
+    count = 1 if whole else np.int64(minimum(math.ceil(longer * longer / maximum(area, longer)), _MOST_MEANS))
+    number, share = _level_of(_LONGEST if whole else longer / count, levels)
+    for _ in range(number):
+        image = _half(image)
+    r, g, b, a = 0.0, 0.0, 0.0, 0.0
+    for k in range(count):
+        step = (k + 0.5) / count - 0.5
+        x, y = middle[0] + (0.0 if whole else along[0] * step), middle[1] + (0.0 if whole else along[1] * step)
+        found = _between_four(scene, row, image, x, y)
+        if share > 0.0:
+            found = _mixed(found, _between_four(scene, row, _half(image), x, y), share)
+        r, g, b, a = r + found[0], g + found[1], b + found[2], a + found[3]
+    return r / count, g / count, b / count, a / count
+
+
+@inlined
+def _half(image):
+    """The next level of a pyramid."""
+    return _Level(image.first + image.wide * image.high, maximum(image.wide // 2, 1), maximum(image.high // 2, 1))
+
+
+@inlined
+def _level_of(width, levels):
+    """The finer of two levels whose texels have a width of so many, and the share of the coarser."""
+    if width <= 1.0:
         return np.int64(0), 0.0
-    if not pixels < 2.0**30:
-        return levels - 1, 0.0
-    width, level = power_below(pixels), np.int64(0)
-    while level < levels - 1 and width >= 2.0:
-        width *= 0.5
+    power, level = power_below(width), np.int64(0)
+    size = power
+    while level < levels - 1 and size >= 2.0:
+        size *= 0.5
         level += 1
     # Linear between two powers of two.
-    return level, pixels / power_below(pixels) - 1.0 if level < levels - 1 else 0.0
+    return level, width / power - 1.0 if level < levels - 1 else 0.0
 
 
 @inlined
@@ -97,11 +158,11 @@ def _wrapped(rule, i, count):
 
 
 @inlined
-def _texel(scene, row, first, wide, high, i, j):
-    i = _wrapped(load(scene.textures, row + WRAP), i, wide)
+def _texel(scene, row, image, i, j):
+    i = _wrapped(load(scene.textures, row + WRAP), i, image.wide)
     # The first row is the upper one; v points up.
-    j = high - 1 - _wrapped(load(scene.textures, row + WRAP + 1), j, high)
-    at = CHANNELS * (first + j * wide + i)
+    j = image.high - 1 - _wrapped(load(scene.textures, row + WRAP + 1), j, image.high)
+    at = CHANNELS * (image.first + j * image.wide + i)
     return (
         np.float64(load(scene.texels, at)), np.float64(load(scene.texels, at + 1)),
         np.float64(load(scene.texels, at + 2)), np.float64(load(scene.texels, at + 3)),
@@ -109,20 +170,18 @@ def _texel(scene, row, first, wide, high, i, j):
 
 
 @inlined
-def _nearest(scene, row, first, wide, high, x, y):
-    return _texel(scene, row, first, wide, high, np.int64(np.floor(x * wide)), np.int64(np.floor(y * high)))
+def _nearest(scene, row, image, x, y):
+    return _texel(scene, row, image, np.int64(np.floor(x * image.wide)), np.int64(np.floor(y * image.high)))
 
 
 @kernel
-def _between_four(scene, row, first, wide, high, x, y):
+def _between_four(scene, row, image, x, y):
     """The value at a place from the four texels around it."""
-    x, y = x * wide - 0.5, y * high - 0.5
+    x, y = x * image.wide - 0.5, y * image.high - 0.5
     left, low = np.floor(x), np.floor(y)
     i, j, s, t = np.int64(left), np.int64(low), x - left, y - low
-    lower = _mixed(_texel(scene, row, first, wide, high, i, j), _texel(scene, row, first, wide, high, i + 1, j), s)
-    upper = _mixed(
-        _texel(scene, row, first, wide, high, i, j + 1), _texel(scene, row, first, wide, high, i + 1, j + 1), s
-    )
+    lower = _mixed(_texel(scene, row, image, i, j), _texel(scene, row, image, i + 1, j), s)
+    upper = _mixed(_texel(scene, row, image, i, j + 1), _texel(scene, row, image, i + 1, j + 1), s)
     return _mixed(lower, upper, t)
 
 

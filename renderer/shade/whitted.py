@@ -208,8 +208,8 @@ def _put_look(scene, bundle, scratch, i, together, look):
     surface, d = offset(scratch.surfaces, i * SURFACE_DOUBLES), row3(bundle.directions, i)
     width = load(bundle.widths, i) + scene.spread * load(scratch.found.t, i)
     store(bundle.widths, i, width)
-    row = scene.looks.row(scene, together.seen, look, width, offset(scratch.own, i * OWN_COLUMNS))
-    look = Look(look.p, look.facet, scene.looks.normal(scene, together.seen, look, width), look.material)
+    row = scene.looks.row(scene, together.seen, look, d, width, offset(scratch.own, i * OWN_COLUMNS))
+    look = Look(look.p, look.facet, scene.looks.normal(scene, together.seen, look, d, width), look.material)
     # The shading normal faces the eye; a surface without light from behind has two sides.
     inside = dot(d, look.n_s) > 0.0
     put3(surface, POINT, look.p)

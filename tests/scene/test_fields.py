@@ -63,6 +63,7 @@ pytestmark = [pytest.mark.filterwarnings("ignore::renderer.SceneWarning"), pytes
     "scene.materials.phong.reflectance", "scene.materials.phong.shininess", "scene.materials.phong.specular",
     "scene.materials.phong.transmittance", "scene.materials.phong.type", "scene.materials.phong.emission",
     "scene.materials.phong.opacity", "scene.materials.phong.cutoff", "scene.materials.phong.diffuse_map",
+    "scene.materials.phong.ambient_map",
     "scene.materials.phong.specular_map", "scene.materials.phong.reflectance_map",
     "scene.materials.phong.transmittance_map", "scene.materials.phong.emission_map",
     "scene.materials.phong.opacity_map", "scene.materials.phong.normal_map",
@@ -143,6 +144,7 @@ def kind(name: str) -> Field:
 
 
 MAPS = (
+    "ambient_map",
     "diffuse_map",
     "specular_map",
     "reflectance_map",
