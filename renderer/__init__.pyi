@@ -1,6 +1,10 @@
 from . import shapes as shapes
+from .arguments.fields import SceneWarning as SceneWarning
 from .errors import MeshError as MeshError
 from .errors import SceneError as SceneError
+from .materials.dielectric import Dielectric as Dielectric
+from .materials.mirror import Mirror as Mirror
+from .materials.phong import Phong as Phong
 from .mesh.load import load_mesh as load_mesh
 from .mesh.material import MeshMaterial as MeshMaterial
 from .mesh.mesh import Mesh as Mesh
@@ -31,12 +35,8 @@ from .scene.cameras.orthographic import OrthographicCamera as OrthographicCamera
 from .scene.cameras.perspective import PerspectiveCamera as PerspectiveCamera
 from .scene.cameras.pinhole import PinholeCamera as PinholeCamera
 from .scene.cameras.thin_lens import ThinLensCamera as ThinLensCamera
-from .scene.fields import SceneWarning as SceneWarning
 from .scene.light import DirectionalLight as DirectionalLight
 from .scene.light import PointLight as PointLight
-from .scene.material import Dielectric as Dielectric
-from .scene.material import Mirror as Mirror
-from .scene.material import Phong as Phong
 from .scene.needs import Needs as Needs
 from .scene.needs import needs_of as needs_of
 from .scene.scene import Floor as Floor

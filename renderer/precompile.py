@@ -21,6 +21,9 @@ from renderer.errors import expect
 from renderer.jit import cache as kernel_store
 from renderer.jit.decorators import is_on_disk
 from renderer.jit.notice import QUIET_VARIABLE
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.phong import Phong
+from renderer.materials.registry import Material
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
 from renderer.octree import BruteForce, Octree
@@ -28,7 +31,6 @@ from renderer.picture.prepare import PreparedScene, prepare_scene
 from renderer.picture.render import render
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.light import PointLight
-from renderer.scene.material import Dielectric, Material, Phong
 from renderer.scene.needs import needs_of
 from renderer.scene.scene import Scene, SceneObject
 from renderer.shade.tile import render_tile

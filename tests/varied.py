@@ -30,11 +30,13 @@ from renderer import (
     load_scene,
     render,
 )
+from renderer.arguments.fields import Fields
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.mirror import Mirror
+from renderer.materials.phong import Phong
 from renderer.mesh.load import save_ply
 from renderer.mesh.shapes import box, icosphere
 from renderer.picture.image import CutWarning
-from renderer.scene.fields import Fields
-from renderer.scene.material import Dielectric, Mirror, Phong
 from renderer.scene.scene import Floor, RenderSettings, SceneObject
 from renderer.scene.sky import Sky
 

@@ -241,8 +241,8 @@ def _write(
 def _picture(mesh: Any, camera: Any, options: argparse.Namespace, up: str) -> Any:
     """The faces and normals that a camera sees; by default it looks down from the south-west."""
     from renderer.diagnostics.mesh_values import FINER, map_size
+    from renderer.materials.phong import Phong
     from renderer.picture.render import render
-    from renderer.scene.material import Phong
     from renderer.scene.overview import from_above
     from renderer.scene.scene import Scene, SceneObject
 

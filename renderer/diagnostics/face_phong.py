@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.arguments.types import ArrayLike
+from renderer.materials.columns import AMBIENT, DIFFUSE, KIND, LAMBERT, REFLECTANCE, TRANSMITTANCE
 from renderer.picture.image import srgb, srgb_steps
 from renderer.scene.vectors import checked_vector
 from renderer.shade.face_colors import PLACES, shade_faces
-from renderer.shade.records import AMBIENT, DIFFUSE, KIND, LAMBERT, REFLECTANCE, TRANSMITTANCE
 from renderer.shade.surface import SceneArrays
 from renderer.system.threads import checked_threads, for_chunks
 

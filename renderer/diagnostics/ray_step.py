@@ -9,15 +9,15 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.materials.columns import AMBIENT, KIND, LAMBERT, MATERIAL_COLUMNS, TRANSMITTANCE
 from renderer.numerics.vec3 import add, dot, normalized, scale, sub, times
 from renderer.picture.pack import media_around
 from renderer.picture.prepare import MediaRule, PreparedScene, arrays_for, media_limit
 from renderer.results.hits import Hits
 from renderer.shade.crossing import SPARE, Change, Together, change_of, place_at, surface_together_of, together_of
 from renderer.shade.lights import aim_from
-from renderer.shade.records import AMBIENT, KIND, LAMBERT, MATERIAL_COLUMNS, PHONG, TRANSMITTANCE
 from renderer.shade.shading import reflect
-from renderer.shade.surface import SceneArrays, Surface, missed_of, phong_of, surface_of
+from renderer.shade.surface import SceneArrays, Surface, missed_of, reflected_of, surface_of
 from renderer.shade.whitted import passes_light_of, refract_from
 from renderer.trace.batch import check_rays, make_starts
 from renderer.trace.closest import closest_hits
@@ -127,7 +127,7 @@ class Steps:
 
     def aims(self, ray: Ray, met: SurfaceHit) -> list[Aim]:
         """The shadow rays to the lights that the surface faces."""
-        if met.material[KIND] not in (PHONG, LAMBERT):
+        if met.material[KIND] < LAMBERT:
             return []
         aims = []
         for light in range(len(self.arrays.lights)):
@@ -136,7 +136,7 @@ class Steps:
             if not seen.faces:
                 continue
             end = self.beyond(o, way) if seen.directional else seen.place
-            share = phong_of(self.arrays, met.row, met.n, ray.direction, seen.towards)
+            share = reflected_of(self.arrays, met.row, met.n, ray.direction, seen.towards)
             radiance = times(ray.weight, times(share, seen.arriving))
             start = _NO_START if is_off else self._start(met.place, met.surface.n_g, way, ray.direction)
             aims.append(Aim(light, o, way, float(t_max), end, radiance, start))

@@ -7,17 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import expect
+from renderer.materials.appearance import Appearance
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.texture import Texture
 from renderer.mesh.texture_image import TextureImage
 from renderer.scene.instance import Instance
-from renderer.scene.material import Material, Phong
 from renderer.shade.records import (
     CLAMP,
     COLORS,
     CUTOFF,
     EMISSION,
-    EMITTED,
     LINEAR,
     MAP_COLUMNS,
     MIPMAP,
@@ -46,7 +45,7 @@ class Maps(NamedTuple):
     texels: NDArray[np.float32]
 
 
-def maps_of(materials: Iterable[Material]) -> Maps:
+def maps_of(looks: Iterable[Appearance]) -> Maps:
     """The textures of materials, each image once. Raises ``MeshError`` for an image that cannot be read."""
     images = _Images()
     textures: dict[tuple[Texture, bool], int] = {}
@@ -54,27 +53,23 @@ def maps_of(materials: Iterable[Material]) -> Maps:
     def number(texture: Texture | None, is_color: bool) -> float:
         return -1.0 if texture is None else float(textures.setdefault((texture, is_color), len(textures)))
 
-    rows = [_row(material, number) for material in materials]
+    rows = [_row(look, number) for look in looks]
     table = [
         _texture_row(texture, *images.placed(texture.image, is_color, texture.filter)) for texture, is_color in textures
     ]
     return Maps(np.array(rows).reshape(-1, MAP_COLUMNS), np.array(table).reshape(-1, TEXTURE_COLUMNS), images.texels())
 
 
-def _row(material: Material, number: Any) -> NDArray[np.float64]:
+def _row(look: Appearance, number: Any) -> NDArray[np.float64]:
     """A material's row of ``maps``."""
     row = np.zeros(MAP_COLUMNS)
-    row[: 2 * EMITTED + 1 : 2] = row[2 * EMITTED] = row[NORMAL_MAP] = row[OPACITY_MAP] = -1.0
-    row[OPACITY] = 1.0
-    if not isinstance(material, Phong):
-        return row
     for k, (name, tinted) in enumerate(zip(_COLOR_MAPS, _TINTED, strict=True)):
-        diffuse = k == 0 and material.ambient is None
-        row[2 * k] = number(material.diffuse_map if diffuse else getattr(material, name), True)
-        row[2 * k + 1] = float(tinted and (k > 0 or diffuse) and material.vertex_colors is not None)
-    row[EMISSION : EMISSION + 3] = material.emission
-    row[NORMAL_MAP], row[OPACITY_MAP] = number(material.normal_map, False), number(material.opacity_map, False)
-    row[OPACITY], row[CUTOFF] = material.opacity, material.cutoff
+        row[2 * k] = number(look.textures.get(name), True)
+        row[2 * k + 1] = float(tinted and look.vertex_colors is not None)
+    row[EMISSION : EMISSION + 3] = look.emission
+    for column, name in ((NORMAL_MAP, "normal_map"), (OPACITY_MAP, "opacity_map")):
+        row[column] = number(look.textures.get(name), False)
+    row[OPACITY], row[CUTOFF] = look.opacity, look.cutoff
     return row
 
 
@@ -143,33 +138,27 @@ def _pyramid(level: NDArray[np.float32], whole: bool) -> Iterator[NDArray[np.flo
         yield level
 
 
-def texcoords_of(instance: Instance, mesh: Mesh, material: Material) -> NDArray[np.float64]:
+def texcoords_of(instance: Instance, mesh: Mesh, look: Appearance) -> NDArray[np.float64]:
     """The texture coordinates of a mesh's vertices, (V, 2); zero where its material has no texture.
 
     Raises ``ValueError`` if it has one, and the mesh has no coordinates.
     """
-    maps = list(material.textures) if isinstance(material, Phong) else []
     if mesh.texcoords is not None:
         return mesh.texcoords
     whose = f"mesh {mesh.name!r} of material {instance.material!r}"
-    expect(not maps, whose, f"texture coordinates for its {', '.join(maps)}", "none")
+    expect(not look.textures, whose, f"texture coordinates for its {next(iter(look.textures), '')}", "none")
     return np.zeros((len(mesh.vertices), 2))
 
 
-def tints_of(instance: Instance, mesh: Mesh, material: Material) -> NDArray[np.float64]:
+def tints_of(instance: Instance, mesh: Mesh, look: Appearance) -> NDArray[np.float64]:
     """The linear colours of a mesh's vertices, (V, 3); white where its material does not use them.
 
     Raises ``ValueError`` if it does, and the mesh has none.
     """
-    space = material.vertex_colors if isinstance(material, Phong) else None
+    space = look.vertex_colors
     if space is None:
         return np.ones((len(mesh.vertices), 3))
     whose = f"mesh {mesh.name!r} of material {instance.material!r}"
     expect(mesh.colors is not None, whose, "colours of vertices for its vertex_colors", "none")
     colors = np.asarray(mesh.colors, np.float64)
     return linear_of_srgb(colors) if space == "srgb" else colors
-
-
-def has_holes(materials: Iterable[Material]) -> bool:
-    """Whether a mask leaves out any surface."""
-    return any(isinstance(material, Phong) and material.cutoff > 0.0 for material in materials)

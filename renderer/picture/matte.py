@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.materials.columns import AMBIENT, KIND, UNLIT
 from renderer.picture.encoding import write_pixels
 from renderer.picture.exposure import exposed
 from renderer.picture.image import srgb
 from renderer.picture.prepare import PreparedScene
 from renderer.scene.camera import Camera
 from renderer.scene.scene import RenderSettings
-from renderer.shade.records import AMBIENT, KIND, UNLIT
+from renderer.shade.records import EMISSION
 from renderer.system.files import write_atomically
 from renderer.trace.spawn import BOUNDED
 
@@ -72,8 +73,11 @@ def _unlit(prepared: PreparedScene) -> PreparedScene:
     arrays = prepared.arrays
     materials = np.zeros_like(arrays.materials)
     materials[:, KIND], materials[:, AMBIENT : AMBIENT + 3] = UNLIT, 1.0
+    # Of what changes along surfaces, opacity alone is left.
+    maps = arrays.maps.copy()
+    maps[:, 0:EMISSION:2], maps[:, 1:EMISSION:2], maps[:, EMISSION : EMISSION + 3] = -1.0, 0.0, 0.0
     needs = replace(prepared.needs, reflection=False, refraction=False)
-    alone = arrays._replace(materials=materials, media=arrays.media[:0], touching=arrays.touching[:0])
+    alone = arrays._replace(materials=materials, maps=maps, media=arrays.media[:0], touching=arrays.touching[:0])
     return replace(prepared, needs=needs, arrays=alone)
 
 

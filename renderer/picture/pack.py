@@ -6,15 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.inside.rational import crossings_of, winding_of
+from renderer.materials.base import appearance_of
+from renderer.materials.columns import KIND, LAMBERT, MATERIAL_COLUMNS, PHONG, UNLIT
 from renderer.mesh.mesh import Mesh
-from renderer.picture.maps import Maps, has_holes, maps_of, texcoords_of, tints_of
+from renderer.picture.maps import Maps, maps_of, texcoords_of, tints_of
 from renderer.scene.camera import Camera
 from renderer.scene.light import light_row
-from renderer.scene.material import kind_of, material_row
 from renderer.scene.needs import Features, lit_materials, needs_of
 from renderer.scene.scene import Scene
 from renderer.scene.sky import sky_rows
-from renderer.shade.records import KIND, LAMBERT, LIGHT_COLUMNS, MAP_COLUMNS, MATERIAL_COLUMNS, PHONG, UNLIT
+from renderer.shade.records import LIGHT_COLUMNS, MAP_COLUMNS
 from renderer.shade.surface import MAX_MEDIA, SceneArrays
 
 
@@ -42,7 +43,7 @@ def pack(scene: Scene, needs: Features | None = None) -> tuple[Mesh, SceneArrays
         smooth=np.repeat(lit.smooth, counts if len(lit.smooth) else 0),
     )
     if needs.textures:
-        looks = [(i, i.mesh, scene.materials[i.material]) for i in instances]
+        looks = [(i, i.mesh, appearance_of(scene.materials[i.material])) for i in instances]
         texcoords = np.concatenate([np.zeros((0, 2)), *(texcoords_of(*look) for look in looks)])
         tints = np.concatenate([np.zeros((0, 3)), *(tints_of(*look) for look in looks)])
         arrays = arrays._replace(texcoords=texcoords, tints=tints)
@@ -77,7 +78,8 @@ def _maps(scene: Scene, needs: Features) -> dict[str, Any]:
     """The fields of ``SceneArrays`` that only pictures with textures fill."""
     if not needs.textures:
         return Maps(np.zeros((0, MAP_COLUMNS)), np.zeros(0, np.int64), np.zeros(0, np.float32))._asdict()
-    return maps_of(scene.materials.values())._asdict() | {"holes": has_holes(scene.materials.values())}
+    looks = [appearance_of(material) for material in scene.materials.values()]
+    return maps_of(looks)._asdict() | {"holes": any(look.cutoff > 0.0 for look in looks)}
 
 
 def repacked(arrays: SceneArrays, scene: Scene, needs: Features) -> SceneArrays:
@@ -101,8 +103,8 @@ def _colors(scene: Scene) -> NDArray[np.float64]:
 
 def _materials(scene: Scene, needs: Features) -> NDArray[np.float64]:
     """The rows of the materials, of kinds that have all that ``needs`` names, whether the scene needs it or not."""
-    rows = np.array([material_row(m) for m in scene.materials.values()]).reshape(-1, MATERIAL_COLUMNS)
-    kinds, lit = rows[:, KIND], {kind_of(material) for material in lit_materials(scene)}
+    rows = np.array([appearance_of(m).row() for m in scene.materials.values()]).reshape(-1, MATERIAL_COLUMNS)
+    kinds, lit = rows[:, KIND], {appearance.kind for appearance in lit_materials(scene)}
     if needs.shadows and lit <= {UNLIT}:
         kinds[kinds == UNLIT] = LAMBERT
     if needs.specular and PHONG not in lit:

@@ -5,8 +5,8 @@ from typing import Any
 
 from pydantic import Field, ValidationError
 
+from renderer.arguments.fields import Color, Fields, first_fault
 from renderer.errors import expect
-from renderer.scene.fields import Color, Fields, first_fault
 from renderer.scene.hide import without
 from renderer.scene.scene import (
     AnyCamera,

@@ -9,13 +9,15 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from renderer.arguments.fields import SceneWarning
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.phong import Phong
+from renderer.materials.registry import Material
 from renderer.mesh.load import load_mesh, mesh_suffix
 from renderer.mesh.material import MeshMaterial
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.texture import Texture
 from renderer.mesh.texture_image import TextureImage
-from renderer.scene.fields import SceneWarning
-from renderer.scene.material import Dielectric, Material, Phong
 
 Space = Literal["linear", "srgb"]
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import field_validator
 
+from renderer.arguments.fields import Color, Fields, FiniteVector, stated
 from renderer.arguments.types import ArrayLike
-from renderer.scene.fields import Color, Fields, FiniteVector, stated
 from renderer.scene.vectors import unit
 from renderer.shade.records import DIRECTIONAL, POINT
 

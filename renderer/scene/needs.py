@@ -12,9 +12,11 @@ from typing import NamedTuple
 
 from renderer.arguments.counts import count_argument
 from renderer.errors import expect
+from renderer.materials.appearance import Appearance
+from renderer.materials.base import appearance_of
+from renderer.materials.columns import CLEAR
 from renderer.scene.instance import Instance
 from renderer.scene.light import light_row
-from renderer.scene.material import Phong
 from renderer.scene.scene import Scene
 
 # The most faces for which no tree is built. Whole frames of boxes and spheres on a floor, one thread: to test all
@@ -91,22 +93,21 @@ def examine(scene: Scene, max_depth: int | None = None) -> tuple[Finding, ...]:
     """
     depth = scene.render.max_depth if max_depth is None else max_depth
     present = _present(scene)
-    used = {i.material: scene.materials[i.material] for i in present}
-    phong = {name: m for name, m in used.items() if isinstance(m, Phong)}
+    used = {i.material: appearance_of(scene.materials[i.material]) for i in present}
     # rule: shining-lights
     shining = sum(any(light_row(light)[4:]) for light in scene.all_lights)
     faces = sum(i.faces for i in present)
-    receiving = _lit("shadows", "receives direct light", shining, (n for n, m in phong.items() if m.receives_light))
+    receiving = _lit("shadows", "receives direct light", shining, (n for n, m in used.items() if m.receives_light))
     return (
         _bounce("reflection", "reflects", depth, (n for n, m in used.items() if any(m.reflectance))),
         _bounce("refraction", "lets light through", depth, (n for n, m in used.items() if m.passes_light)),
         receiving,
-        _lit("specular", "has highlights", shining, (n for n, m in phong.items() if any(m.specular))),
+        _lit("specular", "has highlights", shining, (n for n, m in used.items() if any(m.specular))),
         _smooth(present),
         _lights(receiving, shining, len(scene.all_lights)),
         _precision(present),
         Finding("octree", faces > FEW_FACES, f"{faces} faces, and a tree pays above {FEW_FACES}"),
-        _finding("textures", "has textures, opacity or emission", (n for n, m in phong.items() if not m.is_plain)),
+        _finding("textures", "has textures, opacity or emission", (n for n, m in used.items() if not m.is_plain)),
     )
 
 
@@ -162,12 +163,12 @@ def checked_needs(needs: Features | None, scene: Scene, max_depth: int) -> Featu
     return needs
 
 
-def lit_materials(scene: Scene) -> list[Phong]:
-    """The Phong materials of faces, none where no light shines."""
+def lit_materials(scene: Scene) -> list[Appearance]:
+    """The materials of faces that may reflect the light of lights, none where no light shines."""
     if not any(any(light_row(light)[4:]) for light in scene.all_lights):
         return []
-    used = (scene.materials[i.material] for i in _present(scene))
-    return [material for material in used if isinstance(material, Phong)]
+    used = (appearance_of(scene.materials[i.material]) for i in _present(scene))
+    return [appearance for appearance in used if appearance.kind != CLEAR]
 
 
 def _present(scene: Scene) -> list[Instance]:

@@ -17,19 +17,29 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
+from renderer.arguments.fields import (
+    Color,
+    Fields,
+    FiniteVector,
+    Keys,
+    SceneWarning,
+    first_fault,
+    shown,
+    stated,
+    thrice,
+)
 from renderer.arguments.types import ArrayLike
 from renderer.arguments.up import UP_AXES, up_axis
 from renderer.errors import MeshError, NoSuchSceneError, SceneError, expect, expect_known
 from renderer.lazy import lazy
+from renderer.materials.registry import Material
 from renderer.mesh.load import MESH_SUFFIXES, FilePaths, load_mesh, mesh_paths, mesh_suffix
 from renderer.mesh.mesh import Mesh
 from renderer.scene.camera import Camera, sample_offsets
 from renderer.scene.cameras.base import BaseCamera
-from renderer.scene.fields import Color, Fields, FiniteVector, Keys, SceneWarning, first_fault, shown, stated, thrice
 from renderer.scene.file_material import space_of, with_own_materials
 from renderer.scene.instance import Instance
 from renderer.scene.light import DirectionalLight, Light, PointLight
-from renderer.scene.material import Material
 from renderer.scene.showcase import showcase_text
 from renderer.scene.sky import Sky
 from renderer.system.files import as_path, read_whole, write_atomically

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
+from renderer.arguments.fields import Color, Fields, FiniteVector, stated
 from renderer.arguments.types import ArrayLike
 from renderer.arguments.up import UP_AXES, turn_to
-from renderer.scene.fields import Color, Fields, FiniteVector, stated
 from renderer.scene.light import DirectionalLight
 from renderer.studies.directions import Pattern, fibonacci_hemisphere
 

@@ -9,10 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
+from renderer.materials.columns import IOR
+from renderer.materials.registry import lets_through
 from renderer.numerics.simd import load, minimum, pointer, store
 from renderer.numerics.vec3 import dot
-from renderer.shade.records import IOR
-from renderer.shade.surface import Look, left_from, lets_through, look_at, material_of, scene_pointers
+from renderer.shade.surface import Look, left_from, look_at, material_of, scene_pointers
 from renderer.trace.spawn import Place
 from renderer.trace.starts.cone import NUMBER, PATH, holder, make_holders, put_holder
 from renderer.trace.starts.level import NO_MEMBER, Spot, list_members, list_near, member_spot

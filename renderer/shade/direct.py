@@ -6,14 +6,15 @@ k_a I_a + sum over lights V [k_d (N.L)+ + k_s (R.V)+^n] I_light
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
+from renderer.materials.columns import TRANSMITTANCE
+from renderer.materials.registry import reflected_light
 from renderer.numerics.simd import load, offset, store
 from renderer.numerics.vec3 import add, largest_component, put3, row3, sub, three, times
 from renderer.shade.bundle import SIZE
 from renderer.shade.crossing import place_at
 from renderer.shade.lights import aim, aim_off, see_light
 from renderer.shade.looks import OWN_COLUMNS
-from renderer.shade.records import DIELECTRIC, KIND, MIRROR, TRANSMITTANCE, UNLIT
-from renderer.shade.surface import bounds_at, look_at, phong, raised, surface_at
+from renderer.shade.surface import bounds_at, look_at, raised, surface_at
 from renderer.trace.rays import RayPointers
 from renderer.trace.spawn import Facet, Place, put_all_visible, put_no_start, put_start, spawn_origin
 from renderer.trace.starts.level import Spot
@@ -73,13 +74,6 @@ def put_bounds(scene, surface):
     store(row, 3, slack)
 
 
-@inlined
-def is_lit(materials, m):
-    """Whether the material in row ``m`` reflects direct light."""
-    kind = load(materials, m + KIND)
-    return kind != MIRROR and kind != DIELECTRIC and kind != UNLIT
-
-
 @kernel
 def _aim_all(scene, bundle, surfaces, lit, count, light, rule, shadows):
     """Aim shadow rays from the surfaces of the ``count`` rays in ``lit`` at a light.
@@ -120,7 +114,7 @@ def _aim_all(scene, bundle, surfaces, lit, count, light, rule, shadows):
 def _add_light(scene, bundle, surface, i, towards, arriving):
     """Add the share of a light that reaches the surface of ray ``i`` and is reflected back along the ray."""
     m, n, d = np.int64(load(surface, MATERIAL)), three(surface, NORMAL), row3(bundle.directions, i)
-    factor = phong(scene, m, n, d, towards)
+    factor = reflected_light(scene.materials, m, n, d, towards)
     put3(surface, LIGHT, add(three(surface, LIGHT), times(factor, arriving)))
 
 

@@ -3,11 +3,12 @@
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
+from renderer.materials.columns import AMBIENT
+from renderer.materials.registry import reflected_light
 from renderer.numerics.simd import load, maximum, minimum, pointer
 from renderer.numerics.vec3 import add, cross, dot, normalized, row3, scale, sub, three, times
 from renderer.shade.lights import see_light
-from renderer.shade.records import AMBIENT
-from renderer.shade.surface import material_of, phong, scene_pointers
+from renderer.shade.surface import material_of, scene_pointers
 
 # Equal parts of [0, 1], so narrow that a code is found within a step or two: steps of sRGB are 3e-4 apart and more.
 PLACES = 4096
@@ -36,6 +37,6 @@ def shade_faces(arrays, eye, colors, steps, first, begin, end):
         for light in range(seen.light_count):
             lamp = see_light(seen.lights, light, p, n, 0.0)
             if lamp.faces:
-                color = add(color, times(phong(seen, m, n, d, lamp.towards), lamp.arriving))
+                color = add(color, times(reflected_light(seen.materials, m, n, d, lamp.towards), lamp.arriving))
         for k in range(3):
             colors[face, k] = _encoded(color[k], steps, first)

@@ -6,6 +6,7 @@ Other pictures have kernels without any of this, chosen when they are compiled.
 from typing import Any, NamedTuple
 
 from renderer.jit.decorators import inlined, kernel
+from renderer.materials.columns import AMBIENT, MATERIAL_COLUMNS, TRANSMITTANCE
 from renderer.numerics.simd import doubles_between, load, maximum, store
 from renderer.numerics.vec3 import (
     add,
@@ -22,19 +23,16 @@ from renderer.numerics.vec3 import (
     times,
 )
 from renderer.shade.records import (
-    AMBIENT,
     COLORS,
     CUTOFF,
     EMISSION,
     EMITTED,
     MAP_COLUMNS,
-    MATERIAL_COLUMNS,
     NORMAL_MAP,
     OPACITY,
     OPACITY_MAP,
     STRENGTH,
     TEXTURE_COLUMNS,
-    TRANSMITTANCE,
 )
 from renderer.shade.texture import Patch, texture_at
 

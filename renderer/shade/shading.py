@@ -1,4 +1,4 @@
-"""Phong, Fresnel, reflection and refraction, for kernels.
+"""Reflection and refraction, for kernels.
 
 Vectors are tuples of float64. ``n`` is the unit normal on the side of the incoming ray, so d . n <= 0.
 """
@@ -6,7 +6,7 @@ Vectors are tuples of float64. ``n`` is the unit normal on the side of the incom
 import math
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.vec3 import add, dot, scale, sub
+from renderer.numerics.vec3 import dot, scale, sub
 
 
 @inlined
@@ -36,29 +36,3 @@ def refract(d, n, n1, n2):
         return -1.0, d
     cos_t = math.sqrt(cos2)
     return cos_t, sub(scale(q, eta), scale(n, cos_t))
-
-
-@kernel
-def fresnel(cos_i, cos_t, n1, n2):
-    """Unpolarised reflectance of a dielectric boundary."""
-    if n1 == n2:
-        return 0.0  # also where both cosines are 0
-    s = (n1 * cos_i - n2 * cos_t) / (n1 * cos_i + n2 * cos_t)
-    p = (n1 * cos_t - n2 * cos_i) / (n1 * cos_t + n2 * cos_i)
-    # rule: both-polarisations
-    return 0.5 * (s * s + p * p)
-
-
-@kernel
-def specular(d, n, light, shininess):
-    """(R . V)^shininess with R = 2 N (N . L) - L and V = -d, 0 where R . V <= 0.
-
-    exp(n log1p(-|R - V|^2 / 2)) keeps its accuracy where R . V is close to 1 and the exponent large.
-    """
-    r = sub(scale(n, 2.0 * dot(n, light)), light)
-    # rule: highlight-in-front
-    if -dot(r, d) <= 0.0:
-        return 0.0
-    difference = add(r, d)
-    short = 0.5 * dot(difference, difference)
-    return math.exp(shininess * math.log1p(-short)) if short < 1.0 else 0.0

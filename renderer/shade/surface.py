@@ -6,12 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
+from renderer.materials.registry import reflected_light
 from renderer.numerics.simd import load, minimum, pointer
-from renderer.numerics.vec3 import add, barycentric, dot, largest_component, normalized, row3, scale, sub, three
+from renderer.numerics.vec3 import add, barycentric, dot, largest_component, normalized, row3, scale, sub
 from renderer.shade.faces import MERGED, PLACED, FaceWays
 from renderer.shade.looks import PLAIN, TEXTURED, LookWays
-from renderer.shade.records import DIFFUSE, KIND, PHONG, SHININESS, SPECULAR, TRANSMITTANCE
-from renderer.shade.shading import specular
 from renderer.trace.instances import scene_pointers as instance_pointers
 from renderer.trace.spawn import Facet, facet_of, offset_distance
 from renderer.trace.trees import of_kind
@@ -279,18 +278,6 @@ def surface_at(scene, face, u, v, d):
 
 
 @inlined
-def phong(scene, m, n, d, towards):
-    """The share of light from the unit direction ``towards`` that the material in row ``m`` reflects against d: k_d N.L
-    + k_s (R.V)^n, for N.L >= 0.
-    """
-    factor = scale(three(scene.materials, m + DIFFUSE), dot(n, towards))
-    if load(scene.materials, m + KIND) == PHONG:
-        shininess = load(scene.materials, m + SHININESS)
-        factor = add(factor, scale(three(scene.materials, m + SPECULAR), specular(d, n, towards, shininess)))
-    return factor
-
-
-@inlined
 def missed(scene, d):
     """The radiance of a ray of unit direction d that hits nothing."""
     if not scene.has_sky:
@@ -300,12 +287,6 @@ def missed(scene, d):
     if sine <= 0.0:
         return row3(scene.sky, 3)
     return add(scale(row3(scene.sky, 1), sine), scale(row3(scene.sky, 2), 1.0 - sine))
-
-
-@inlined
-def lets_through(materials, m):
-    """Whether the material in row ``m`` transmits light."""
-    return largest_component(three(materials, m + TRANSMITTANCE)) > 0.0
 
 
 @kernel
@@ -321,6 +302,6 @@ def missed_of(arrays, d):
 
 
 @kernel
-def phong_of(arrays, m, n, d, towards):
-    """``phong``, for Python."""
-    return phong(scene_pointers(arrays), m, n, d, towards)
+def reflected_of(arrays, m, n, d, towards):
+    """``reflected_light``, for Python."""
+    return reflected_light(scene_pointers(arrays).materials, m, n, d, towards)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
+from renderer.materials.registry import lets_through
 from renderer.numerics.simd import (
     fabs,
     lowest_bit,
@@ -19,7 +20,7 @@ from renderer.numerics.simd import (
     store,
 )
 from renderer.numerics.vec3 import largest_of_three, length, sub
-from renderer.shade.surface import lets_through, material_of, scene_pointers
+from renderer.shade.surface import material_of, scene_pointers
 from renderer.trace.edge_signs import corner
 from renderer.trace.intersect import face_in, load_corners
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS

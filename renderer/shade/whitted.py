@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
+from renderer.materials.columns import REFLECTANCE
+from renderer.materials.registry import bounced_light, is_lit, passes_light
 from renderer.numerics.simd import load, offset, store
 from renderer.numerics.vec3 import add, dot, largest_component, normalized, put3, row3, scale, three, times
 from renderer.shade.bundle import (
@@ -49,7 +51,6 @@ from renderer.shade.direct import (
     SURFACE_DOUBLES,
     begin_shadows,
     behind_holes,
-    is_lit,
     light_surfaces,
     place_of,
     put_bounds,
@@ -57,9 +58,8 @@ from renderer.shade.direct import (
     put_place,
 )
 from renderer.shade.looks import OWN_COLUMNS
-from renderer.shade.records import DIELECTRIC, KIND, MIRROR, REFLECTANCE, TRANSMITTANCE
-from renderer.shade.shading import fresnel, reflect, refract
-from renderer.shade.surface import Look, lets_through, look_at, missed, scene_pointers, surface_at
+from renderer.shade.shading import reflect, refract
+from renderer.shade.surface import Look, look_at, missed, scene_pointers, surface_at
 from renderer.trace.rays import HitPointers, RayPointers
 from renderer.trace.spawn import OffsetRule, Place, put_all_visible, put_start, spawn_origin
 from renderer.trace.starts.level import Spot
@@ -269,22 +269,10 @@ def _refract(scene, m, d, n, n1, n2):
     """The refracted ray of a ray in direction d from index n1 to n2 at a surface of material ``m``, whose normal n
     faces it: its direction, whether there is one, k_r and k_t.
     """
-    materials = scene.materials
-    k_r, k_t = three(materials, m + REFLECTANCE), three(materials, m + TRANSMITTANCE)
     # rule: refraction
     cos_t, through = refract(d, n, n1, n2)
-    if load(materials, m + KIND) == DIELECTRIC:
-        # rule: total-reflection
-        f = 1.0 if cos_t < 0.0 else fresnel(-dot(d, n), cos_t, n1, n2)
-        # rule: tint-of-glass
-        k_r, k_t = scale(k_r, f), scale(k_t, 1.0 - f)
+    k_r, k_t = bounced_light(scene.materials, m, -dot(d, n), cos_t, n1, n2)
     return through, cos_t >= 0.0, k_r, k_t
-
-
-@inlined
-def passes_light(materials, m):
-    """Whether the material in row ``m`` has refracted rays, perhaps of weight 0."""
-    return lets_through(materials, m) or load(materials, m + KIND) == DIELECTRIC
 
 
 @kernel
@@ -381,11 +369,9 @@ def _collect_light(scene, bundle, scratch):
         if load(scratch.found.face, i) < 0:
             continue
         surface = offset(scratch.surfaces, i * SURFACE_DOUBLES)
-        kind = load(scene.materials, np.int64(load(surface, MATERIAL)) + KIND)
-        if kind != MIRROR and kind != DIELECTRIC:
-            pixel = load(bundle.pixels, i)
-            own = times(row3(bundle.weights, i), three(surface, LIGHT))
-            put3(scratch.color, 3 * pixel, add(row3(scratch.color, pixel), own))
+        pixel = load(bundle.pixels, i)
+        own = times(row3(bundle.weights, i), three(surface, LIGHT))
+        put3(scratch.color, 3 * pixel, add(row3(scratch.color, pixel), own))
 
 
 @kernel

@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from renderer.arguments.fields import Fields
 from renderer.errors import expect
 from renderer.mesh.load import mesh_suffix
 from renderer.mesh.mesh import Mesh
 from renderer.scene.camera import OrthographicCamera
-from renderer.scene.fields import Fields
 from renderer.scene.light import DirectionalLight, Light
 from renderer.scene.scene import Scene
 from renderer.scene.showcase import showcase_text

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from renderer.diagnostics.tree_boxes import boxes_at, levels
 from renderer.errors import expect
+from renderer.materials.base import appearance_of
+from renderer.materials.columns import DIFFUSE, MATERIAL_COLUMNS, REFLECTANCE, SHININESS, SPECULAR, TRANSMITTANCE
+from renderer.materials.registry import Material
 from renderer.mesh.mesh import face_normals
 from renderer.picture.prepare import PreparedScene
 from renderer.scene.hide import is_side
 from renderer.scene.light import DirectionalLight, Light
-from renderer.scene.material import Material, material_row
 from renderer.scene.needs import examine
-from renderer.shade.records import DIFFUSE, MATERIAL_COLUMNS, REFLECTANCE, SHININESS, SPECULAR, TRANSMITTANCE
 from renderer.shade.surface import SceneArrays
 from renderer.viewer.parts import parts_of
 from renderer.viewer.protocol import MODES
@@ -119,7 +120,7 @@ def _materials(arrays: SceneArrays, some: slice) -> NDArray[np.uint16]:
 
 
 def _material(name: str, material: Material) -> dict[str, Any]:
-    row = material_row(material).tolist()
+    row = appearance_of(material).row().tolist()
     colors = {"diffuse": DIFFUSE, "specular": SPECULAR, "reflectance": REFLECTANCE, "transmittance": TRANSMITTANCE}
     return {
         "name": name,

@@ -8,9 +8,9 @@ import numpy as np
 from renderer.diagnostics.ray_path import Segment, ray_path
 from renderer.diagnostics.ray_step import Vector
 from renderer.diagnostics.tree_boxes import Visit, visited
+from renderer.materials.columns import MATERIAL_COLUMNS
 from renderer.picture.prepare import PreparedScene
 from renderer.results.hits import Hits
-from renderer.shade.records import MATERIAL_COLUMNS
 from renderer.shade.surface import surface_of
 from renderer.viewer.compare import Comparison
 from renderer.viewer.parts import part_of_face

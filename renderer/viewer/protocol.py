@@ -5,9 +5,9 @@ from typing import Annotated, Literal, NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, field_validator, model_validator
 
+from renderer.arguments.fields import FiniteVector
 from renderer.arguments.limits import FARTHEST
 from renderer.scene.camera import sample_offsets
-from renderer.scene.fields import FiniteVector
 from renderer.scene.scene import AnyLight, AnyMaterial
 from renderer.scene.sky import Sky
 

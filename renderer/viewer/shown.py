@@ -9,16 +9,18 @@ from typing import Literal, NamedTuple
 
 from renderer.errors import expect
 from renderer.lazy import lazy
+from renderer.materials.columns import REFLECTANCE, TRANSMITTANCE
+from renderer.materials.phong import Phong
+from renderer.materials.registry import Material
 from renderer.picture.pack import light_rows, repacked
 from renderer.picture.prepare import PreparedScene, build_octree, prepare_scene, tree_for
 from renderer.precompile import touch_viewing
 from renderer.scene.change import surroundings
 from renderer.scene.hide import is_side, object_names, without
-from renderer.scene.material import Material, Phong
 from renderer.scene.needs import Features, needs_of
 from renderer.scene.scene import RenderSettings, Scene, load_scene, mesh_files
 from renderer.scene.vectors import unit
-from renderer.shade.records import DIRECTIONAL, REFLECTANCE, TRANSMITTANCE
+from renderer.shade.records import DIRECTIONAL
 from renderer.shade.surface import SceneArrays
 from renderer.system.files import is_special
 from renderer.system.threads import available_threads

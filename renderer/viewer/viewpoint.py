@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import ValidationError
 
+from renderer.arguments.fields import first_fault
 from renderer.errors import SceneError, expect
 from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera, PinholeCamera
-from renderer.scene.fields import first_fault
 from renderer.viewer.protocol import Pixel
 
 # The kinds of cameras that the page has.

@@ -40,10 +40,11 @@ from renderer import (
     render,
 )
 from renderer.cli.main import main
+from renderer.materials import columns
+from renderer.materials.base import appearance_of
 from renderer.mesh.shapes import icosphere
 from renderer.picture import prepare as preparing
 from renderer.scene.light import light_row
-from renderer.scene.material import kind_of, material_row
 from renderer.shade import records
 from renderer.system.threads import available_threads
 
@@ -293,8 +294,8 @@ def test_joined_meshes_have_texture_coordinates_where_all_have_them() -> None:
 
 def test_rows_for_kernels_have_their_columns() -> None:
     for material in (Dielectric(), Mirror(), Phong()):
-        row = material_row(material)
-        assert row.shape == (records.MATERIAL_COLUMNS,) and row.dtype == np.float64
+        row = appearance_of(material).row()
+        assert row.shape == (columns.MATERIAL_COLUMNS,) and row.dtype == np.float64
     for light in (PointLight(position=(0, 1, 0)), DirectionalLight(direction=(0, 1, 0), irradiance=2)):
         row = light_row(light)
         assert row.shape == (records.LIGHT_COLUMNS,) and row.dtype == np.float64
@@ -302,8 +303,8 @@ def test_rows_for_kernels_have_their_columns() -> None:
 
 def test_the_kind_of_phong_follows_its_colours() -> None:
     black, grey = (0.0, 0.0, 0.0), (0.5, 0.5, 0.5)
-    kinds = [kind_of(Phong(diffuse=d, specular=s)) for d in (black, grey) for s in (black, grey)]
-    assert kinds == [records.UNLIT, records.PHONG, records.LAMBERT, records.PHONG]
+    kinds = [appearance_of(Phong(diffuse=d, specular=s)).kind for d in (black, grey) for s in (black, grey)]
+    assert kinds == [columns.UNLIT, columns.PHONG, columns.LAMBERT, columns.PHONG]
 
 
 @pytest.mark.judges("CutWarning", "Image", "Image.cut_message")

@@ -124,7 +124,7 @@ CHANGES = {
     "CompileResult._rebuild = lambda *a: None\n",
 }
 ASK = """
-from renderer.shade.shading import fresnel
+from renderer.materials.dielectric import fresnel
 print(fresnel(1.0, 1.0, 1.0, 1.5), fresnel(1.0, 1.0, 1.0, 1.5) == fresnel.py_func(1.0, 1.0, 1.0, 1.5))
 """
 

@@ -9,13 +9,16 @@ from cases import cases
 from numpy.typing import NDArray
 
 from renderer.diagnostics.face_phong import face_colors
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.mirror import Mirror
+from renderer.materials.phong import Phong
+from renderer.materials.registry import Material
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, icosphere, torus
 from renderer.picture.image import srgb
 from renderer.picture.pack import pack
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.light import DirectionalLight, PointLight
-from renderer.scene.material import Dielectric, Material, Mirror, Phong
 from renderer.scene.needs import needs_of
 from renderer.scene.scene import Scene, SceneObject
 

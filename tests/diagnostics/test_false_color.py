@@ -8,12 +8,12 @@ from cases import cases
 from numpy.typing import NDArray
 
 from renderer.diagnostics.false_color import AOVS, VIRIDIS, false_color, limits_of, limits_of_counts
+from renderer.materials.phong import Phong
 from renderer.mesh.shapes import icosphere
 from renderer.picture.image import Image, srgb
 from renderer.picture.render import render
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.light import DirectionalLight
-from renderer.scene.material import Phong
 from renderer.scene.scene import Scene, SceneObject
 
 BACKGROUND = (0.1, 0.2, 0.4)

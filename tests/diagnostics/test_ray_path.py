@@ -9,13 +9,16 @@ import pytest
 from cases import cases
 
 from renderer.diagnostics.ray_path import MAX_RAYS, Segment, ray_path
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.mirror import Mirror
+from renderer.materials.phong import Phong
+from renderer.materials.registry import Material
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, icosphere, torus
 from renderer.picture.prepare import PreparedScene, prepare_scene
 from renderer.picture.render import render
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.light import DirectionalLight, PointLight
-from renderer.scene.material import Dielectric, Material, Mirror, Phong
 from renderer.scene.needs import needs_of
 from renderer.scene.scene import Floor, Scene, SceneObject, load_scene
 

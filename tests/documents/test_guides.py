@@ -11,6 +11,9 @@ from cases import cases
 
 from renderer import SceneError
 from renderer.cli.main import make_parser
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.mirror import Mirror
+from renderer.materials.phong import Phong
 from renderer.mesh.shapes import box
 from renderer.scene.camera import (
     EquirectangularCamera,
@@ -22,7 +25,6 @@ from renderer.scene.camera import (
     ThinLensCamera,
 )
 from renderer.scene.light import DirectionalLight, PointLight
-from renderer.scene.material import Dielectric, Mirror, Phong
 from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject
 from renderer.scene.sky import Sky
 from renderer.viewer import protocol

@@ -15,11 +15,11 @@ from viewer_page import Viewer
 
 from renderer import load_scene
 from renderer.diagnostics.face_phong import face_colors
+from renderer.materials.columns import MATERIAL_COLUMNS
 from renderer.picture.image import Image, srgb
 from renderer.picture.prepare import PreparedScene, prepare_scene
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.needs import needs_of
-from renderer.shade.records import MATERIAL_COLUMNS
 
 
 def picture_of(scenes: Path, shown: dict[str, Any], **settings: Any) -> Image:

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from cases import cases
 
+from renderer.materials.phong import Phong
 from renderer.mesh.shapes import icosphere
 from renderer.picture import prepare as preparing
 from renderer.picture.prepare import TILE
 from renderer.picture.render import render
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.light import DirectionalLight
-from renderer.scene.material import Phong
 from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject, load_scene
 
 pytestmark = pytest.mark.judges(

@@ -9,12 +9,12 @@ from cases import cases
 from hypothesis import given
 from hypothesis import strategies as st
 
+from renderer.materials.phong import Phong
 from renderer.mesh.shapes import icosphere, torus
 from renderer.octree import Octree
 from renderer.picture.pack import pack
 from renderer.picture.render import render
 from renderer.scene.camera import OrthographicCamera, PerspectiveCamera, primary_rays, sample_offsets
-from renderer.scene.material import Phong
 from renderer.scene.scene import Scene, SceneObject
 
 pytestmark = pytest.mark.judges(

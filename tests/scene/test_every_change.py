@@ -11,12 +11,12 @@ from varied import BASE, VARIATIONS, Table, Variation, picture, scene_of
 
 from renderer import Hits, Mesh, Octree, Phong, RenderSettings, Scene, SceneObject, Sky
 from renderer.cli.main import main
+from renderer.materials.registry import Material
 from renderer.mesh.shapes import icosphere
 from renderer.scene.camera import Camera
 from renderer.scene.change import _Changes, changed
 from renderer.scene.hide import object_names
 from renderer.scene.light import Light
-from renderer.scene.material import Material
 
 CHANGED = [other for other in VARIATIONS if other.keys[0] in _Changes.model_fields]
 

@@ -11,15 +11,17 @@ from cases import cases
 
 from renderer import Image, Mesh, Needs, Scene, load_scene, needs_of, render
 from renderer.cli.main import main
+from renderer.materials.columns import KIND, PHONG
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.mirror import Mirror
+from renderer.materials.phong import Phong
 from renderer.mesh.shapes import box, grid, icosphere
 from renderer.picture.pack import pack
 from renderer.picture.prepare import build_octree, kernel_settings_of, tree_for
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.light import DirectionalLight, PointLight, light_row
-from renderer.scene.material import Dielectric, Mirror, Phong
 from renderer.scene.needs import FEW_FACES, examine
 from renderer.scene.scene import Floor, RenderSettings, SceneObject
-from renderer.shade.records import KIND, PHONG
 from renderer.shade.surface import MAX_MEDIA
 
 pytestmark = pytest.mark.judges(

@@ -11,6 +11,10 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from renderer.errors import MeshError, SceneError
+from renderer.materials.columns import MATERIAL_COLUMNS
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.mirror import Mirror
+from renderer.materials.phong import Phong
 from renderer.mesh.load import save_ply
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, icosphere
@@ -18,9 +22,7 @@ from renderer.picture.pack import pack
 from renderer.picture.render import render
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.light import DirectionalLight, PointLight, light_row
-from renderer.scene.material import Dielectric, Mirror, Phong
 from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject, load_scene
-from renderer.shade.records import MATERIAL_COLUMNS
 
 pytestmark = pytest.mark.judges(
     "Floor", "Mesh.transformed", "RenderSettings", "Scene", "Scene.instances", "SceneError",

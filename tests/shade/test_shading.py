@@ -12,7 +12,9 @@ from cases import cases
 from hypothesis import given
 from hypothesis import strategies as st
 
-from renderer.shade.shading import fresnel, reflect, refract, specular
+from renderer.materials.dielectric import fresnel
+from renderer.materials.phong import specular
+from renderer.shade.shading import reflect, refract
 from renderer.trace.spawn import BOUNDED, MITSUBA_EPSILON, OffsetRule, facet_of, offset_distance, spawn_origin
 
 U = 2.0**-53

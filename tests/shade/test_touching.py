@@ -8,6 +8,10 @@ import pytest
 from cases import cases
 
 from renderer.diagnostics.ray_path import MAX_RAYS, ray_path
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.mirror import Mirror
+from renderer.materials.phong import Phong
+from renderer.materials.registry import Material
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, grid, icosphere
 from renderer.picture.image import Image
@@ -15,7 +19,6 @@ from renderer.picture.prepare import prepare_scene
 from renderer.picture.render import render
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.light import DirectionalLight
-from renderer.scene.material import Dielectric, Material, Mirror, Phong
 from renderer.scene.needs import needs_of
 from renderer.scene.scene import Floor, Scene, SceneObject
 from renderer.trace.spawn import MITSUBA_EPSILON

@@ -9,13 +9,15 @@ from cases import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.mirror import Mirror
+from renderer.materials.phong import Phong
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, grid, icosphere, torus
 from renderer.picture.image import Image
 from renderer.picture.render import render
 from renderer.scene.camera import OrthographicCamera, PerspectiveCamera
 from renderer.scene.light import DirectionalLight, PointLight
-from renderer.scene.material import Dielectric, Mirror, Phong
 from renderer.scene.scene import Floor, Scene, SceneObject
 from renderer.trace.spawn import MITSUBA_EPSILON
 

@@ -18,9 +18,12 @@ from typing import Any
 
 import numpy as np
 
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.mirror import Mirror
+from renderer.materials.phong import Phong
+from renderer.materials.registry import Material
 from renderer.scene.camera import OrthographicCamera
 from renderer.scene.light import DirectionalLight, Light, PointLight
-from renderer.scene.material import Dielectric, Material, Mirror, Phong
 from renderer.scene.scene import Scene
 from renderer.scene.sky import Sky
 

@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.phong import Phong
 from renderer.picture.prepare import MediaRule
 from renderer.picture.render import prepare
 from renderer.scene.camera import primary_rays
-from renderer.scene.material import Dielectric, Phong
 from renderer.scene.scene import Scene
 from validation.error_curves import slope
 from validation.gates import Gate

@@ -12,11 +12,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.mirror import Mirror
+from renderer.materials.phong import Phong
+from renderer.materials.registry import Material
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box
 from renderer.picture.render import render
 from renderer.scene.camera import OrthographicCamera, PerspectiveCamera
-from renderer.scene.material import Dielectric, Material, Mirror, Phong
 from renderer.scene.scene import UNLIMITED_RAYS, Floor, Scene, SceneObject
 from validation.gates import Gate
 from validation.job import Job

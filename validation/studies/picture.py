@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from renderer.diagnostics import mesh_values as drawing
+from renderer.materials.phong import Phong
 from renderer.octree import Octree
 from renderer.picture.render import render
-from renderer.scene.material import Phong
 from renderer.scene.overview import from_above
 from renderer.scene.scene import Scene, SceneObject
 from renderer.studies import face_points, sky_view_factor

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from pydantic import field_validator, model_validator
 
 from renderer.arguments.arrays import real_argument
+from renderer.arguments.fields import Fields, FiniteVector
 from renderer.arguments.limits import FARTHEST
 from renderer.arguments.points import check_points
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.numerics.film_rays import affine_rays, along, unit_rows
 from renderer.scene.cameras.intrinsics import Intrinsics
-from renderer.scene.fields import Fields, FiniteVector
 from renderer.scene.vectors import unit
 
 Floats = NDArray[np.float64]

@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 
+from renderer.arguments.fields import stated
 from renderer.arguments.types import ArrayLike
 from renderer.scene.cameras.base import AngularCamera, Floats
-from renderer.scene.fields import stated
 
 
 class EquirectangularCamera(AngularCamera):

@@ -9,9 +9,9 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from renderer.arguments.fields import in_degrees, stated
 from renderer.arguments.types import ArrayLike
 from renderer.scene.cameras.base import AngularCamera, Floats
-from renderer.scene.fields import in_degrees, stated
 
 
 def turned_away(angle: Floats, right: Floats, down: Floats) -> Floats:

@@ -9,12 +9,12 @@ from typing import Literal
 import numpy as np
 
 from renderer.arguments.arrays import real_argument
+from renderer.arguments.fields import stated
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.scene.cameras.base import AngularCamera, Floats
 from renderer.scene.cameras.calibrated import CalibratedCamera, Number, opencv_extrinsics, opencv_intrinsics
 from renderer.scene.cameras.fisheye import turned_away
-from renderer.scene.fields import stated
 
 # Steps of Newton's method, each at least as good as halving where that fails: enough for all bits.
 _STEPS = 60

@@ -7,11 +7,11 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from renderer.arguments.fields import stated
 from renderer.arguments.limits import FARTHEST
 from renderer.arguments.types import ArrayLike
 from renderer.numerics.film_rays import along
 from renderer.scene.cameras.base import AffineCamera, Floats
-from renderer.scene.fields import stated
 
 
 class OrthographicCamera(AffineCamera):

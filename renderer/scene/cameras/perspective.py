@@ -9,10 +9,10 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from renderer.arguments.fields import in_degrees, stated
 from renderer.arguments.types import ArrayLike
 from renderer.scene.cameras.base import CentralCamera, Floats
 from renderer.scene.cameras.intrinsics import Intrinsics
-from renderer.scene.fields import in_degrees, stated
 
 
 class PerspectiveCamera(CentralCamera):

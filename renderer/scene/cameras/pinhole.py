@@ -6,10 +6,10 @@ from typing import Literal
 
 import numpy as np
 
+from renderer.arguments.fields import stated
 from renderer.arguments.types import ArrayLike
 from renderer.scene.cameras.base import CentralCamera, Floats
 from renderer.scene.cameras.calibrated import CalibratedCamera, opencv_extrinsics, opencv_intrinsics
-from renderer.scene.fields import stated
 
 
 class PinholeCamera(CalibratedCamera, CentralCamera):

@@ -8,12 +8,12 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from renderer.arguments.fields import stated
 from renderer.arguments.limits import FARTHEST
 from renderer.arguments.types import ArrayLike
 from renderer.numerics.film_rays import affine_map, affine_rays, unit_rows
 from renderer.scene.cameras.base import Floats
 from renderer.scene.cameras.perspective import PerspectiveCamera
-from renderer.scene.fields import stated
 
 _Length = Annotated[float, Field(ge=0.0, le=FARTHEST, strict=True)]
 # The powers of the inverse of the plastic number, whose multiples fill the unit square evenly: the R2 sequence.

@@ -5,9 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from renderer.materials.phong import Phong
 from renderer.picture.render import render
 from renderer.scene.light import DirectionalLight
-from renderer.scene.material import Phong
 from renderer.scene.scene import load_scene
 from validation.pictures import ladder
 from validation.scenes import SCENES

@@ -11,12 +11,14 @@ import pytest
 from cases import cases
 from PIL import Image as Pillow
 
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.mirror import Mirror
+from renderer.materials.phong import Phong
 from renderer.mesh.shapes import icosphere
 from renderer.picture.image import Image
 from renderer.picture.render import render
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.light import DirectionalLight, PointLight
-from renderer.scene.material import Dielectric, Mirror, Phong
 from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject, load_scene
 from validation.gates import Gate
 from validation.job import Job

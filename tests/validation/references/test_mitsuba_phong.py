@@ -7,10 +7,11 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.phong import Phong
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, icosphere, torus
 from renderer.scene.light import DirectionalLight
-from renderer.scene.material import Dielectric, Phong
 from renderer.scene.scene import Scene
 from validation.references.mitsuba.path import can_judge, path, random_paths
 from validation.references.mitsuba.phong import Glass, PhongMirror

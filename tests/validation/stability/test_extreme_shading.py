@@ -10,10 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from renderer import Image, Mesh, Scene, render
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.mirror import Mirror
+from renderer.materials.phong import Phong
 from renderer.mesh.shapes import box, icosphere, torus
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.light import DirectionalLight, PointLight
-from renderer.scene.material import Dielectric, Mirror, Phong
 from renderer.scene.scene import SceneObject
 from renderer.shade.shading import reflect, refract
 from renderer.trace.spawn import OffsetRule

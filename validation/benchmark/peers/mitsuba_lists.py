@@ -14,8 +14,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.mirror import Mirror
 from renderer.scene.light import PointLight
-from renderer.scene.material import Dielectric, Mirror
 from renderer.scene.scene import Scene
 from validation.benchmark.peers.mitsuba_variant import LLVM, using
 from validation.references.mitsuba import scene as mitsuba_scene

@@ -11,8 +11,10 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.mirror import Mirror
+from renderer.materials.registry import Material
 from renderer.scene.camera import PerspectiveCamera
-from renderer.scene.material import Dielectric, Material, Mirror
 from renderer.scene.scene import Scene
 from validation.benchmark.peers.mitsuba_variant import using
 from validation.references.mitsuba import scene as mitsuba_scene

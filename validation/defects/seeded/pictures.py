@@ -23,7 +23,7 @@ def _holed(sound: Any, vertices: Any, faces: Any) -> Any:
 
 
 def _denser(rows: Any) -> None:
-    from renderer.shade.records import IOR
+    from renderer.materials.columns import IOR
 
     rows[:, IOR] *= 1.501 / 1.5
 

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.diagnostics.ray_step import steps_of
+from renderer.materials.mirror import Mirror
+from renderer.materials.registry import Material
 from renderer.picture.prepare import PreparedScene
-from renderer.scene.material import Material, Mirror
 from renderer.scene.scene import Scene
 from validation.oracle.inside import winding_number
 from validation.pictures.explain.optics import wrong_rays

@@ -4,7 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from renderer.scene.material import Dielectric, Material
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.registry import Material
 from validation.references.ray_tree import Node, Vector
 
 # The textbook's formula for refraction loses digits near the critical angle, and is not compared within this of it.

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.diagnostics.ray_step import Aim, Ray, Steps, SurfaceHit
+from renderer.materials.columns import CLEAR, KIND, TRANSMITTANCE
 from renderer.scene.camera import Camera
-from renderer.shade.records import DIELECTRIC, KIND, TRANSMITTANCE
 from renderer.trace.batch import check_rays
 from renderer.trace.closest import closest_hits
 from renderer.trace.starts.level import Spot
@@ -93,7 +93,7 @@ class Ours:
         surface = met.surface
         node.point, node.normal, node.shading = np.array(surface.p), np.array(surface.n_g), np.array(surface.n_s)
         node.own = np.array(self.steps.ambient(ray, met))
-        if met.material[KIND] == DIELECTRIC or max(met.material[TRANSMITTANCE : TRANSMITTANCE + 3]) > 0.0:
+        if met.material[KIND] == CLEAR or max(met.material[TRANSMITTANCE : TRANSMITTANCE + 3]) > 0.0:
             node.indices = float(met.change.n1), float(met.change.n2)
         return node
 

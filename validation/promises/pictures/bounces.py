@@ -7,12 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.arguments.fields import Color
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.mirror import Mirror
+from renderer.materials.phong import Phong
+from renderer.materials.registry import Material
 from renderer.picture.prepare import PreparedScene
 from renderer.picture.render import prepare, render
 from renderer.scene.camera import OrthographicCamera
-from renderer.scene.fields import Color
 from renderer.scene.light import PointLight
-from renderer.scene.material import Dielectric, Material, Mirror, Phong
 from renderer.scene.scene import RenderSettings, Scene, SceneObject
 from validation.promises.pictures.glowing import BLACK, equal, glowing, shown, square, thing
 from validation.promises.row import row

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.scene.fields import Color
+from renderer.arguments.fields import Color
 from renderer.scene.scene import Floor, Scene
 from validation.promises.pictures.glowing import equal, from_above, glowing, shown
 from validation.promises.row import row

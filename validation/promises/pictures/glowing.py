@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.arguments.fields import Color
+from renderer.materials.phong import Phong
 from renderer.mesh.mesh import Mesh
 from renderer.picture.prepare import PreparedScene
 from renderer.picture.render import render
 from renderer.scene.camera import OrthographicCamera
-from renderer.scene.fields import Color
-from renderer.scene.material import Phong
 from renderer.scene.scene import Scene, SceneObject
 from validation.meshes import squares
 

@@ -10,11 +10,13 @@ import trimesh
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.mirror import Mirror
+from renderer.materials.phong import Phong
 from renderer.mesh.mesh import Mesh
 from renderer.picture.render import render
 from renderer.scene.camera import OrthographicCamera
 from renderer.scene.light import DirectionalLight
-from renderer.scene.material import Dielectric, Mirror, Phong
 from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject
 from validation.promises.pictures.glowing import equal, from_above, glowing, square, thing
 from validation.promises.row import row

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.arguments.fields import Color
 from renderer.mesh.shapes import box
 from renderer.picture.render import prepare
 from renderer.scene.camera import OrthographicCamera
-from renderer.scene.fields import Color
 from renderer.scene.scene import Scene
 from validation.promises.pictures.glowing import equal, glowing, shown, square, thing
 from validation.promises.row import row

@@ -8,11 +8,11 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 from trimesh.transformations import compose_matrix
 
+from renderer.materials.phong import Phong
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.instance import Instance
-from renderer.scene.material import Phong
 from renderer.scene.scene import Scene, SceneObject
 from validation.promises.row import row
 

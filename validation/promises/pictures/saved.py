@@ -9,9 +9,9 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
+from renderer.materials.phong import Phong
 from renderer.mesh.mesh import Mesh
 from renderer.picture.render import render
-from renderer.scene.material import Phong
 from renderer.scene.scene import Scene
 from validation.promises.pictures.glowing import from_above, square, thing
 from validation.promises.row import row

@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.phong import Phong
 from renderer.mesh.mesh import Mesh
 from renderer.picture.render import render
 from renderer.scene.light import DirectionalLight, PointLight
-from renderer.scene.material import Dielectric, Phong
 from renderer.scene.scene import RenderSettings, Scene, SceneObject
 from validation.promises.pictures.glowing import equal, from_above, shown, square, thing
 from validation.promises.row import row

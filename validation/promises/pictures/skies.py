@@ -6,12 +6,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.materials.mirror import Mirror
+from renderer.materials.phong import Phong
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
 from renderer.picture.render import render
 from renderer.scene.camera import OrthographicCamera
 from renderer.scene.light import DirectionalLight
-from renderer.scene.material import Mirror, Phong
 from renderer.scene.scene import Scene, SceneObject
 from renderer.scene.sky import Sky
 from validation.promises.pictures.glowing import equal, from_above, shown, square, thing

@@ -8,7 +8,7 @@ our ambient light on both, so a second pass flips the meshes.
 import mitsuba as mi
 import numpy as np
 
-from renderer.scene.material import Phong
+from renderer.materials.phong import Phong
 from renderer.scene.scene import Scene
 from validation.references.mitsuba import scene as mitsuba_scene
 

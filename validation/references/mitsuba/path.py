@@ -20,7 +20,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.scene.material import Dielectric
+from renderer.materials.dielectric import Dielectric
 from renderer.scene.scene import Scene
 from validation.references.mitsuba import ambient, phong
 from validation.references.mitsuba import scene as mitsuba_scene

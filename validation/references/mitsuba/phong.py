@@ -11,7 +11,10 @@ from math import pi
 import mitsuba as mi
 
 import validation.references.mitsuba.scene as mitsuba_scene  # selects the variant before a class below derives from it
-from renderer.scene.material import Dielectric, Material, Mirror, Phong
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.mirror import Mirror
+from renderer.materials.phong import Phong
+from renderer.materials.registry import Material
 
 _BOTH_SIDES = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
 _LIT = mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.GlossyReflection | _BOTH_SIDES

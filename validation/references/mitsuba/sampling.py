@@ -12,8 +12,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.materials.mirror import Mirror
+from renderer.materials.phong import Phong
 from renderer.scene.camera import PerspectiveCamera
-from renderer.scene.material import Mirror, Phong
 from renderer.scene.scene import Scene
 from validation.references.mitsuba import scene as mitsuba_scene
 from validation.references.mitsuba.path import SHADOWLESS

@@ -14,7 +14,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.scene.material import Dielectric, Material, Mirror, Phong
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.mirror import Mirror
+from renderer.materials.phong import Phong
+from renderer.materials.registry import Material
 from renderer.scene.scene import Scene
 from validation.references.mitsuba import scene as mitsuba_scene
 

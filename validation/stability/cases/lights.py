@@ -5,9 +5,8 @@ import math
 import numpy as np
 
 from renderer import Mesh, Octree, Scene
+from renderer.materials.phong import Phong, specular
 from renderer.scene.light import DirectionalLight, Light, PointLight
-from renderer.scene.material import Phong
-from renderer.shade.shading import specular
 from validation.references.mitsuba.whitted import whitted
 from validation.stability.cases.case import ExtremeCase, Outcome
 from validation.stability.cases.scenes import (

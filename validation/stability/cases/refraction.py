@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer import Mesh, Scene, render
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.phong import Phong
+from renderer.materials.registry import Material
 from renderer.mesh.shapes import box, icosphere, torus
-from renderer.scene.material import Dielectric, Material, Phong
 from renderer.scene.scene import Floor
 from renderer.shade.shading import refract
 from validation.oracle.vectors import cross, dot

@@ -6,9 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer import Image, Mesh, Scene, render
+from renderer.materials.mirror import Mirror
+from renderer.materials.phong import Phong
+from renderer.materials.registry import Material
 from renderer.mesh.shapes import icosphere
 from renderer.scene.camera import Camera, PerspectiveCamera
-from renderer.scene.material import Material, Mirror, Phong
 from renderer.scene.scene import UNLIMITED_RAYS, SceneObject
 
 Vector = tuple[float, float, float]

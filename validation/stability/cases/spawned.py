@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 
 from renderer import Mesh, Octree, Scene, render
+from renderer.materials.phong import Phong
 from renderer.mesh.shapes import icosphere
 from renderer.scene.light import DirectionalLight
-from renderer.scene.material import Phong
 from renderer.shade.shading import reflect, refract
 from renderer.trace.spawn import BOUNDED, OffsetRule, facet_of, offset_distance, spawn_origin
 from validation.references.mitsuba.whitted import whitted
