@@ -138,11 +138,7 @@ class PreparedScene:
         view = camera, (width, height), chosen.samples
         rays_of, side = rays_of_tiles(*view), tile_side(*view)
         settings = kernel_settings_of(self.needs, chosen, offset, media)
-        arrays = arrays_for(self, camera, offset, media)
-        arrays = arrays._replace(soft=chosen.terminator == "soft", clear=chosen.glass_shadows == "clear")
-        if self.needs.textures:
-            pixel, spread = _widths(camera, (width, height), chosen.samples)
-            arrays = arrays._replace(pixel=pixel, spread=spread)
+        arrays = arrays_for(self, camera, chosen, offset, media)
         wide, tall = end_column - first_column, end_row - first_row
         across, cut = -(-wide // side), np.zeros(tiles(wide, tall, side), np.int64)
 
@@ -254,11 +250,16 @@ def kernel_settings_of(
     return Settings(bounces, chosen.min_weight, offset, media_limit(needs, media), chosen.shadows, chosen.max_rays)
 
 
-def arrays_for(prepared: PreparedScene, camera: Camera, offset: OffsetRule, media: MediaRule) -> SceneArrays:
-    """The kernel's arrays for pictures by ``camera``: with the media around it, and without the faces that are crossed
-    together where the rules cross each face by itself.
+def arrays_for(
+    prepared: PreparedScene, camera: Camera, chosen: RenderSettings, offset: OffsetRule, media: MediaRule
+) -> SceneArrays:
+    """The kernel's arrays for pictures by ``camera``: with the media around it, the widths of its rays, and without the
+    faces that are crossed together where the rules cross each face by itself.
     """
-    arrays = prepared.arrays
+    arrays = prepared.arrays._replace(soft=chosen.terminator == "soft", clear=chosen.glass_shadows == "clear")
+    if prepared.needs.textures:
+        pixel, spread = _widths(camera, chosen.resolution, chosen.samples)
+        arrays = arrays._replace(pixel=pixel, spread=spread)
     # rule: media-at-eye
     if prepared.needs.refraction and camera is not prepared.scene.camera:
         arrays = arrays._replace(media=media_around(prepared.scene, camera))

@@ -296,6 +296,24 @@ def surface_of(arrays, face, u, v, d):
 
 
 @kernel
+def own_look_of(arrays, spot, d, width, own):
+    """What a ray of direction d and that ``width`` sees at a ``Spot`` of a picture with textures: writes the row of the
+    material there, with the emission behind it, and returns the shading normal. For Python.
+    """
+    scene = scene_pointers(arrays)
+    look = look_at(scene, spot.face, spot.u, spot.v, d)
+    scene.looks.row(scene, spot, look, d, width, pointer(own))
+    return scene.looks.normal(scene, spot, look, d, width)
+
+
+@kernel
+def is_there_of(arrays, spot):
+    """Whether no mask leaves out the surface at a ``Spot``, for Python."""
+    scene = scene_pointers(arrays)
+    return scene.looks.is_there(scene, spot)
+
+
+@kernel
 def missed_of(arrays, d):
     """``missed``, for Python."""
     return missed(scene_pointers(arrays), d)

@@ -20,7 +20,6 @@ from renderer import (
     load_scene,
     render,
 )
-from renderer.materials.base import appearance_of
 from renderer.mesh.shapes import box, icosphere
 from renderer.scene.file_material import material_of, parts_of_file
 from renderer.scene.scene import write_scene
@@ -53,9 +52,7 @@ def test_alpha_is_a_mask_or_a_share_of_the_image_that_has_it() -> None:
     mask = material_of(MeshMaterial(alpha_mode="mask", alpha_cutoff=0.3, base_color_texture=Texture(rgba)))
     assert isinstance(mask, Phong) and mask.cutoff == 0.3 and mask.opacity_map == mask.diffuse_map
     share = material_of(MeshMaterial(alpha_mode="blend", alpha=0.25, base_color_texture=Texture(rgb)))
-    assert (
-        isinstance(share, Phong) and appearance_of(share).blends and (share.opacity, share.opacity_map) == (0.25, None)
-    )
+    assert isinstance(share, Phong) and (share.opacity, share.opacity_map, share.cutoff) == (0.25, None, 0.0)
     grey = material_of(MeshMaterial(alpha_mode="mask", alpha_texture=Texture(np.full((1, 1, 3), 51, np.uint8))))
     assert isinstance(grey, Phong) and grey.opacity_map is not None
     assert grey.opacity_map.image.pixels.tolist() == [[[pytest.approx(0.2)]]]

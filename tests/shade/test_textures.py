@@ -21,10 +21,12 @@ from renderer import (
     SceneObject,
     Texture,
     needs_of,
+    prepare,
     render,
     shapes,
     srgb,
 )
+from renderer.diagnostics.ray_path import ray_path
 from renderer.mesh.texture import Filter, Wrap
 
 SIZE = 64
@@ -357,3 +359,14 @@ def test_values_of_fields_that_are_no_textures_are_refused() -> None:
     for bad in (3, {"image": "a.png", "filter": "cubic"}, {"pixels": 1}):
         with pytest.raises(SceneError, match="diffuse_map"):
             Phong(diffuse_map=bad)
+
+
+def test_the_path_of_a_ray_adds_up_to_its_pixel() -> None:
+    scene = all_of_it().altered(render={"resolution": (12, 12)})
+    image, ready = render(scene), prepare(scene)
+    origins, directions = scene.camera.primary_rays(12)
+    for row, column in np.argwhere(image.face >= 0)[::3].tolist():
+        path = ray_path(ready, origins[row, column], directions[row, column], scene.render.max_depth)
+        sums = np.sum([segment.radiance for segment in path], axis=0)
+        np.testing.assert_allclose(sums, image.radiance[row, column], rtol=1e-5, atol=1e-6)
+        assert len(path) == image.rays[row, column]

@@ -91,16 +91,16 @@ class Ours:
             return node
         node.face, node.t = int(met.together.seen.face), met.t
         surface = met.surface
-        node.point, node.normal, node.shading = np.array(surface.p), np.array(surface.n_g), np.array(surface.n_s)
+        node.point, node.normal, node.shading = np.array(surface.p), np.array(surface.n_g), np.array(met.seen.n_s)
         node.own = np.array(self.steps.ambient(ray, met))
-        if met.material[KIND] == CLEAR or max(met.material[TRANSMITTANCE : TRANSMITTANCE + 3]) > 0.0:
+        if met.seen.columns[KIND] == CLEAR or max(met.seen.columns[TRANSMITTANCE : TRANSMITTANCE + 3]) > 0.0:
             node.indices = float(met.change.n1), float(met.change.n2)
         return node
 
 
 def _ray(node: Node) -> Ray:
     """The ray of a node, which starts on no surface and is in no medium."""
-    return Ray(node.kind, node.depth, _tuple(node.origin), _tuple(node.direction), _WHOLE, (), np.empty(0))
+    return Ray(node.kind, node.depth, _tuple(node.origin), _tuple(node.direction), _WHOLE, (), 0.0, np.empty(0))
 
 
 def _node(ray: Ray, share: Vector | None = None) -> Node:
