@@ -3,15 +3,18 @@
 Pictures have the bits of those of the merged mesh, as a ray scene answers like it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import groupby
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.materials.appearance import Appearance
+from renderer.materials.base import appearance_of
 from renderer.mesh.mesh import Mesh
 from renderer.octree import SMALLEST, Octree
+from renderer.picture.maps import texcoords_of, tints_of
 from renderer.picture.pack import without_faces
 from renderer.queryable import Built
 from renderer.rayscene.built import BuiltScene, Member, tree_over
@@ -24,11 +27,12 @@ from renderer.trace.layout import MASK_BITS
 # The least number of faces that copies add. Of fewer, the merged mesh is small: 200 bytes a face with its tree.
 _LEAST = 1 << 14
 _NOT_MOVED = np.eye(3, 4)
+Floats = NDArray[np.float64]
 
 
 def placed(scene: Scene, needs: Features, split: Literal["midpoint", "sah"], threads: int) -> BuiltScene | None:
     """``scene`` with each mesh once, where it pays; None where it does not, or where a mesh cannot be placed."""
-    if _copied(scene) < _LEAST or needs.textures:
+    if _copied(scene) < _LEAST:
         return None
     stands = list(_stands(scene))
     sources = {id(mesh): mesh for mesh, _ in stands}
@@ -56,7 +60,7 @@ def _copied(scene: Scene) -> int:
 
 def _stands(scene: Scene) -> Iterator[tuple[Mesh, list[NDArray[np.float64]]]]:
     """Meshes in the order of the scene's instances, and the matrices (3, 4) by which each stands there."""
-    own = [(i.source, i.matrix[:3]) if i.shares_normals else (i.mesh, _NOT_MOVED) for i in scene.instances]
+    own = [(_standing(i), i.matrix[:3] if i.shares_normals else _NOT_MOVED) for i in scene.instances]
     for _, together in groupby(own, lambda pair: id(pair[0])):
         pairs = list(together)
         yield pairs[0][0], [matrix for _, matrix in pairs]
@@ -67,7 +71,27 @@ def placed_arrays(scene: Scene, needs: Features, built: BuiltScene) -> SceneArra
     smooth = [i.smooth and needs.smooth_normals for i in scene.instances]
     own = [_normals(i).ctypes.data if is_smooth else 0 for i, is_smooth in zip(scene.instances, smooth, strict=True)]
     arrays = without_faces(scene, needs)._replace(normals=np.array(own, np.int64), placed=built.top.descriptor)
-    return arrays
+    if not needs.textures:
+        return arrays
+    return arrays._replace(texcoords=_each_once(scene, texcoords_of), tints=_each_once(scene, tints_of))
+
+
+def _each_once(scene: Scene, values_of: Callable[[Instance, Mesh, Appearance], NDArray[np.float64]]) -> Floats:
+    """For each instance the place where its vertices' values start, and behind them the values of each mesh once."""
+    starts, places, parts, end = list[float](), dict[Any, int](), list[Floats](), len(scene.instances)
+    for instance in scene.instances:
+        look, mesh = appearance_of(scene.materials[instance.material]), _standing(instance)
+        which = id(mesh), look.vertex_colors
+        if which not in places:
+            parts.append(values_of(instance, mesh, look).astype(np.float64).ravel())
+            places[which], end = end, end + len(parts[-1])
+        starts.append(places[which])
+    return np.concatenate([np.array(starts, np.float64), *parts])
+
+
+def _standing(instance: Instance) -> Mesh:
+    """The mesh that stands in the scene for an instance, placed or as it is."""
+    return instance.source if instance.shares_normals else instance.mesh
 
 
 def _normals(instance: Instance) -> NDArray[np.float64]:

@@ -3,9 +3,11 @@
 import math
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import power_below
-from renderer.numerics.simd import float64_pointer, load, maximum
+from renderer.numerics.simd import float64_pointer, load, maximum, offset
 from renderer.numerics.vec3 import add, cross, largest_component, row3, scale
 from renderer.trace.instances import FIRST_FACE, INSTANCE_WORDS, column_of, instance_with, placed_corners, placed_face
 
@@ -107,15 +109,21 @@ def _placed_normals(scene, at):
 
 
 @inlined
+def _own_rows(values, at):
+    """Where the values of a placed mesh's vertices are; the places of all stand before them."""
+    return offset(values, np.int64(load(values, (at >> _FACE_BITS) - 1)))
+
+
+@inlined
 def _placed_texcoords(scene, at):
     of = placed_face(scene.placed, at >> _FACE_BITS, at & _FACE)
-    return _pairs(float64_pointer(load(scene.texcoords, (at >> _FACE_BITS) - 1)), of.a, of.b, of.c)
+    return _pairs(_own_rows(scene.texcoords, at), of.a, of.b, of.c)
 
 
 @inlined
 def _placed_tints(scene, at):
     of = placed_face(scene.placed, at >> _FACE_BITS, at & _FACE)
-    tints = float64_pointer(load(scene.tints, (at >> _FACE_BITS) - 1))
+    tints = _own_rows(scene.tints, at)
     return row3(tints, of.a), row3(tints, of.b), row3(tints, of.c)
 
 

@@ -34,7 +34,8 @@ class SceneArrays(NamedTuple):
     textures   (T, TEXTURE_COLUMNS) float64; empty int64 in pictures without textures
     texels     (n,) float32, red, green, blue and alpha of the images of textures, linear
     texcoords  (V, 2), and
-    tints      (V, 3), colours of vertices, linear; as ``normals`` of placed meshes, no rows without textures
+    tints      (V, 3), colours of vertices, linear; of placed meshes flat, behind R places where those of each start; no
+               rows without textures
     lights     (L, LIGHT_COLUMNS)
     colors     (2, 3), ambient and background
     sky        (4, 3), the unit vector up, and the radiance of zenith, horizon and ground; no rows without a sky

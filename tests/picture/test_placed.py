@@ -19,8 +19,16 @@ BALL = icosphere(2)
 # Its normals are not those of its faces.
 SMOOTH = Mesh(BALL.vertices * [1, 1, 2], BALL.faces, np.add(BALL.vertices, [0.3, 0, 0]))
 MATERIALS = {
-    "grey": Phong(diffuse=(0.7, 0.3, 0.1), specular=0.3), "glass": Dielectric(),
-    "tinted": Phong(transmittance=(0.2, 0.8, 0.4), ior=1.2), "mirror": Mirror(reflectance=0.8),
+    "grey": Phong(diffuse=(0.7, 0.3, 0.1), specular=0.3),
+    "glass": Dielectric(),
+    "tinted": Phong(transmittance=(0.2, 0.8, 0.4), ior=1.2),
+    "mirror": Mirror(reflectance=0.8),
+}
+IMAGE = np.random.default_rng(3).integers(0, 256, (6, 5, 4), np.uint8)
+TEXTURED = {
+    "grey": Phong(diffuse_map=IMAGE, normal_map=IMAGE),
+    "glass": Phong(vertex_colors="srgb", opacity_map=IMAGE, cutoff=0.4),
+    "tinted": Phong(transmittance_map=IMAGE, vertex_colors="linear"), "mirror": Mirror(),
 }  # fmt: skip
 
 
@@ -47,6 +55,15 @@ def scattered(seed):
     ]  # fmt: skip
 
 
+def textured(seed):
+    """The meshes of ``scattered``, with texture coordinates and colours of vertices."""
+    dressed = {
+        id(mesh): Mesh(mesh.vertices, mesh.faces, mesh.normals, abs(mesh.vertices) / 2, mesh.vertices[:, :2] * 2)
+        for mesh in (BALL, SMOOTH)
+    }
+    return [o.model_copy(update={"mesh": dressed[id(o.mesh)]}) for o in scattered(seed)]
+
+
 def stacked(_):
     """Boxes of glass that touch, so that rays cross two faces at once, with a glass of water around the eye's place."""
     cells = [(x, y, z) for x in range(2) for y in range(2) for z in range(3)]
@@ -67,14 +84,14 @@ def same_planes(picture, expected):
         np.testing.assert_array_equal(getattr(picture, plane), getattr(expected, plane), err_msg=plane)
 
 
-@cases("make", [scattered, stacked])
+@cases("make", [scattered, textured, stacked])
 @cases("settings", [{}, {"terminator": "soft", "glass_shadows": "clear", "max_depth": 4}])
 def test_the_picture_has_the_bits_of_that_of_the_merged_mesh(always, make, settings):
     for seed in range(3):
         objects = make(seed)
         box_ = objects[0].mesh
         objects = [o.model_copy(update={"mesh": box_}) if make is stacked else o for o in objects]
-        scene = scene_of(objects)
+        scene = scene_of(objects).altered(materials=TEXTURED if make is textured else MATERIALS)
         ready = prepare(scene)
         assert isinstance(ready.built, BuiltScene)
         expected = render(scene, accelerator="octree", resolution=60, **settings)
