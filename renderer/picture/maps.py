@@ -19,6 +19,7 @@ from renderer.shade.records import (
     EMISSION,
     LINEAR,
     MAP_COLUMNS,
+    MAPPED,
     MIPMAP,
     MIRRORED,
     NEAREST,
@@ -27,14 +28,14 @@ from renderer.shade.records import (
     OPACITY_MAP,
     REPEAT,
     TEXTURE_COLUMNS,
+    TINTED,
 )
 
 _WRAPS = {"repeat": REPEAT, "mirror": MIRRORED, "clamp": CLAMP}
 _FILTERS = {"nearest": NEAREST, "linear": LINEAR, "mipmap": MIPMAP}
-# The maps in the order of ``records.COLORS``, and which colours those of vertices multiply.
+# The maps in the order of ``records.COLORS``.
 _COLOR_MAPS = ("ambient_map", "diffuse_map", "specular_map", "reflectance_map", "transmittance_map", "emission_map")
 assert len(_COLOR_MAPS) == len(COLORS) + 1
-_TINTED = (True, True, False, False, False, True)
 
 
 class Maps(NamedTuple):
@@ -63,13 +64,13 @@ def maps_of(looks: Iterable[Appearance]) -> Maps:
 def _row(look: Appearance, number: Any) -> NDArray[np.float64]:
     """A material's row of ``maps``."""
     row = np.zeros(MAP_COLUMNS)
-    for k, (name, tinted) in enumerate(zip(_COLOR_MAPS, _TINTED, strict=True)):
-        row[2 * k] = number(look.textures.get(name), True)
-        row[2 * k + 1] = float(tinted and look.vertex_colors is not None)
+    for k, name in enumerate(_COLOR_MAPS):
+        row[k] = number(look.textures.get(name), True)
     row[EMISSION : EMISSION + 3] = look.emission
     for column, name in ((NORMAL_MAP, "normal_map"), (OPACITY_MAP, "opacity_map")):
         row[column] = number(look.textures.get(name), False)
     row[OPACITY], row[CUTOFF] = look.opacity, look.cutoff
+    row[TINTED], row[MAPPED] = look.vertex_colors is not None, bool(look.textures)
     return row
 
 

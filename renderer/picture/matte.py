@@ -14,7 +14,7 @@ from renderer.picture.image import srgb
 from renderer.picture.prepare import PreparedScene
 from renderer.scene.camera import Camera
 from renderer.scene.scene import RenderSettings
-from renderer.shade.records import EMISSION
+from renderer.shade.records import EMISSION, TINTED
 from renderer.system.files import write_atomically
 from renderer.trace.spawn import BOUNDED
 
@@ -75,7 +75,7 @@ def _unlit(prepared: PreparedScene) -> PreparedScene:
     materials[:, KIND], materials[:, AMBIENT : AMBIENT + 3] = UNLIT, 1.0
     # Of what changes along surfaces, opacity alone is left.
     maps = arrays.maps.copy()
-    maps[:, 0:EMISSION:2], maps[:, 1:EMISSION:2], maps[:, EMISSION : EMISSION + 3] = -1.0, 0.0, 0.0
+    maps[:, :EMISSION], maps[:, EMISSION : EMISSION + 3], maps[:, TINTED] = -1.0, 0.0, 0.0
     needs = replace(prepared.needs, reflection=False, refraction=False)
     alone = arrays._replace(materials=materials, maps=maps, media=arrays.media[:0], touching=arrays.touching[:0])
     return replace(prepared, needs=needs, arrays=alone)

@@ -6,8 +6,8 @@ Other pictures have kernels without any of this, chosen when they are compiled.
 from typing import Any, NamedTuple
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.materials.columns import AMBIENT, MATERIAL_COLUMNS, TRANSMITTANCE
-from renderer.numerics.simd import doubles_between, load, maximum, store
+from renderer.materials.columns import AMBIENT, DIFFUSE, MATERIAL_COLUMNS, TRANSMITTANCE
+from renderer.numerics.simd import doubles_between, extract, load, maximum, splat4, store
 from renderer.numerics.vec3 import (
     add,
     barycentric,
@@ -26,18 +26,21 @@ from renderer.shade.records import (
     COLORS,
     CUTOFF,
     EMISSION,
-    EMITTED,
     MAP_COLUMNS,
+    MAPPED,
     NORMAL_MAP,
     OPACITY,
     OPACITY_MAP,
     STRENGTH,
     TEXTURE_COLUMNS,
+    TINTED,
 )
 from renderer.shade.texture import Patch, texture_at
 
 # A material's row at a point, with the emission behind it.
 OWN_COLUMNS = MATERIAL_COLUMNS + 3
+OWN_COLORS = (*COLORS, MATERIAL_COLUMNS)
+_TINTED = (AMBIENT, DIFFUSE, MATERIAL_COLUMNS)
 # The least cosine of a ray to a face's normal: at a smaller one an ellipse is as long as at this.
 _GRAZING = 2.0**-10
 
@@ -124,51 +127,50 @@ def _patch_at(scene, at, u, v, d, width, facet):
 
 
 @inlined
-def _tinted(scene, maps, k, color, patch, tint):
-    """A colour times what the k-th pair of columns of maps names."""
-    texture = load(scene.maps, maps + 2 * k)
-    if texture >= 0.0:
-        r, g, b, _ = texture_at(scene, int(texture), patch)
-        color = times(color, (r, g, b))
-    return times(color, tint) if load(scene.maps, maps + 2 * k + 1) != 0.0 else color
-
-
-@inlined
-def _has_tints(scene, maps):
-    tints = False
-    for k in range(EMITTED + 1):
-        tints = tints or load(scene.maps, maps + 2 * k + 1) != 0.0
-    return tints
+def _rgb(lanes):
+    return extract(lanes, 0), extract(lanes, 1), extract(lanes, 2)
 
 
 @inlined
 def _opacity(scene, maps, patch):
     opacity, texture = load(scene.maps, maps + OPACITY), load(scene.maps, maps + OPACITY_MAP)
-    return opacity * texture_at(scene, int(texture), patch)[3] if texture >= 0.0 else opacity
+    return opacity * extract(texture_at(scene, int(texture), patch), 3) if texture >= 0.0 else opacity
 
 
 @kernel
 def _own_row(scene, spot, look, d, width, own):
     at, maps = scene.ways.at(scene, spot.face), _maps_of(look.material)
-    patch = _patch_at(scene, at, spot.u, spot.v, d, width, look.facet)
-    tint = (1.0, 1.0, 1.0)
-    if _has_tints(scene, maps):
-        a, b, c = scene.ways.tints(scene, at)
-        tint = barycentric(a, b, c, spot.u, spot.v)
     for k in range(MATERIAL_COLUMNS):
         store(own, k, load(scene.materials, look.material + k))
-    for k in range(EMITTED):
-        put3(own, COLORS[k], _tinted(scene, maps, k, three(own, COLORS[k]), patch, tint))
-    emission = _tinted(scene, maps, EMITTED, three(scene.maps, maps + EMISSION), patch, tint)
-    if load(scene.maps, maps + CUTOFF) == 0.0:
+    put3(own, MATERIAL_COLUMNS, three(scene.maps, maps + EMISSION))
+    opacity = load(scene.maps, maps + OPACITY)
+    if load(scene.maps, maps + MAPPED) != 0.0:
+        patch = _patch_at(scene, at, spot.u, spot.v, d, width, look.facet)
+        _put_mapped(scene, maps, patch, own)
         opacity = _opacity(scene, maps, patch)
-        for k in range(EMITTED):
-            put3(own, COLORS[k], scale(three(own, COLORS[k]), opacity))
+    if load(scene.maps, maps + TINTED) != 0.0:
+        a, b, c = scene.ways.tints(scene, at)
+        for k in _TINTED:
+            put3(own, k, times(three(own, k), barycentric(a, b, c, spot.u, spot.v)))
+    if opacity < 1.0 and load(scene.maps, maps + CUTOFF) == 0.0:
+        for k in OWN_COLORS:
+            put3(own, k, scale(three(own, k), opacity))
         rest = 1.0 - opacity
         put3(own, TRANSMITTANCE, add(three(own, TRANSMITTANCE), (rest, rest, rest)))
-        emission = scale(emission, opacity)
-    put3(own, MATERIAL_COLUMNS, emission)
     return doubles_between(scene.materials, own)
+
+
+@inlined
+def _put_mapped(scene, maps, patch, own):
+    """Multiply the colours of a row by their textures."""
+    last, values = -1.0, splat4(1.0)
+    for k in range(len(OWN_COLORS)):
+        texture = load(scene.maps, maps + k)
+        if texture >= 0.0:
+            # Ambient and diffuse light mostly share theirs.
+            if texture != last:
+                last, values = texture, texture_at(scene, int(texture), patch)
+            put3(own, OWN_COLORS[k], times(three(own, OWN_COLORS[k]), _rgb(values)))
 
 
 @kernel
@@ -182,7 +184,7 @@ def _mapped_normal(scene, spot, look, d, width):
     along, other = _tangents(scene, at, n)
     if largest_component(along) == 0.0:
         return n
-    r, g, b, _ = texture_at(scene, number, _patch_at(scene, at, spot.u, spot.v, d, width, look.facet))
+    r, g, b = _rgb(texture_at(scene, number, _patch_at(scene, at, spot.u, spot.v, d, width, look.facet)))
     strength = load(scene.textures, number * TEXTURE_COLUMNS + STRENGTH)
     x, y, z = strength * (2.0 * r - 1.0), strength * (2.0 * g - 1.0), 2.0 * b - 1.0
     return normalized(add(add(scale(along, x), scale(other, y)), scale(n, z)))

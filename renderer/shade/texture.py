@@ -7,14 +7,14 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import power_below
-from renderer.numerics.simd import load, maximum, minimum
+from renderer.numerics.simd import load, load4, maximum, minimum, splat4
 from renderer.shade.records import (
     ACROSS,
-    CLAMP,
     DOWN,
     FILTER,
     LEVELS,
     MIPMAP,
+    MIRRORED,
     NEAREST,
     REPEAT,
     TEXEL,
@@ -54,7 +54,7 @@ class _Level(NamedTuple):
 
 @kernel
 def texture_at(scene, texture, patch):
-    """Red, green, blue and alpha of a texture: at the middle of a ``Patch``, or of a MIPMAP about the mean over it."""
+    """Four lanes, red, green, blue and alpha: a texture at the middle of a ``Patch``, a MIPMAP about its mean there."""
     row = texture * TEXTURE_COLUMNS
     x, y = _moved(scene.textures, row, patch.u, patch.v)
     image = _Level(
@@ -111,19 +111,19 @@ def _mean(scene, row, image, middle, along, longer, area):
     levels = np.int64(load(scene.textures, row + LEVELS))
     whole = not longer < _LONGEST
     # Fewer circles than would fill the ellipse are wider.
-    count = 1 if whole else np.int64(minimum(math.ceil(longer * longer / maximum(area, longer)), _MOST_MEANS))
+    count = 1 if whole else np.int64(minimum(longer * longer / maximum(area, longer), _MOST_MEANS) + 0.5)
     number, share = _level_of(_LONGEST if whole else longer / count, levels)
     for _ in range(number):
         image = _half(image)
-    r, g, b, a = 0.0, 0.0, 0.0, 0.0
+    total = splat4(0.0)
     for k in range(count):
         step = (k + 0.5) / count - 0.5
         x, y = middle[0] + (0.0 if whole else along[0] * step), middle[1] + (0.0 if whole else along[1] * step)
         found = _between_four(scene, row, image, x, y)
         if share > 0.0:
             found = _mixed(found, _between_four(scene, row, _half(image), x, y), share)
-        r, g, b, a = r + found[0], g + found[1], b + found[2], a + found[3]
-    return r / count, g / count, b / count, a / count
+        total = total + found
+    return total * (1.0 / count)
 
 
 @inlined
@@ -142,52 +142,68 @@ def _level_of(width, levels):
     while level < levels - 1 and size >= 2.0:
         size *= 0.5
         level += 1
-    # Linear between two powers of two.
-    return level, width / power - 1.0 if level < levels - 1 else 0.0
+    # Between two powers of two the nearer alone, but for the middle half of the way, where one gives way to the other.
+    share = minimum(maximum(2.0 * (width / power) - 2.5, 0.0), 1.0) if level < levels - 1 else 0.0
+    return (level + 1, 0.0) if share == 1.0 else (level, share)
+
+
+@inlined
+def _folded(rule, x):
+    """A coordinate in images, moved into the first by what is beyond its edges."""
+    if rule == REPEAT:
+        return x - np.floor(x)
+    if rule == MIRRORED:
+        x -= 2.0 * np.floor(0.5 * x)
+        return 2.0 - x if x > 1.0 else x
+    return x
 
 
 @inlined
 def _wrapped(rule, i, count):
-    """The number of the texel that stands for the i-th of a row of ``count``."""
-    if rule == CLAMP:
-        return minimum(maximum(i, np.int64(0)), count - 1)
+    """The number of the texel that stands for the i-th of a row of ``count``, which is at most one beyond an end."""
     if rule == REPEAT:
-        return i % count
-    there = i % (2 * count)
-    return there if there < count else 2 * count - 1 - there
+        return i + count if i < 0 else i - count if i >= count else i
+    return minimum(maximum(i, np.int64(0)), count - 1)
 
 
 @inlined
-def _texel(scene, row, image, i, j):
-    i = _wrapped(load(scene.textures, row + WRAP), i, image.wide)
+def _column(scene, row, image, i):
+    return image.first + _wrapped(load(scene.textures, row + WRAP), i, image.wide)
+
+
+@inlined
+def _line(scene, row, image, j):
     # The first row is the upper one; v points up.
-    j = image.high - 1 - _wrapped(load(scene.textures, row + WRAP + 1), j, image.high)
-    at = CHANNELS * (image.first + j * image.wide + i)
-    return (
-        np.float64(load(scene.texels, at)), np.float64(load(scene.texels, at + 1)),
-        np.float64(load(scene.texels, at + 2)), np.float64(load(scene.texels, at + 3)),
-    )  # fmt: skip
+    return (image.high - 1 - _wrapped(load(scene.textures, row + WRAP + 1), j, image.high)) * image.wide
+
+
+@inlined
+def _place(scene, row, image, x, y):
+    """A place in texels."""
+    x, y = _folded(load(scene.textures, row + WRAP), x), _folded(load(scene.textures, row + WRAP + 1), y)
+    return x * image.wide, y * image.high
 
 
 @inlined
 def _nearest(scene, row, image, x, y):
-    return _texel(scene, row, image, np.int64(np.floor(x * image.wide)), np.int64(np.floor(y * image.high)))
+    x, y = _place(scene, row, image, x, y)
+    at = _column(scene, row, image, np.int64(np.floor(x))) + _line(scene, row, image, np.int64(np.floor(y)))
+    return load4(scene.texels, CHANNELS * at)
 
 
 @kernel
 def _between_four(scene, row, image, x, y):
     """The value at a place from the four texels around it."""
-    x, y = x * image.wide - 0.5, y * image.high - 0.5
-    left, low = np.floor(x), np.floor(y)
-    i, j, s, t = np.int64(left), np.int64(low), x - left, y - low
-    lower = _mixed(_texel(scene, row, image, i, j), _texel(scene, row, image, i + 1, j), s)
-    upper = _mixed(_texel(scene, row, image, i, j + 1), _texel(scene, row, image, i + 1, j + 1), s)
+    x, y = _place(scene, row, image, x, y)
+    left, low = np.floor(x - 0.5), np.floor(y - 0.5)
+    s, t, i, j = x - 0.5 - left, y - 0.5 - low, np.int64(left), np.int64(low)
+    left, right = _column(scene, row, image, i), _column(scene, row, image, i + 1)
+    low, high = _line(scene, row, image, j), _line(scene, row, image, j + 1)
+    lower = _mixed(load4(scene.texels, CHANNELS * (left + low)), load4(scene.texels, CHANNELS * (right + low)), s)
+    upper = _mixed(load4(scene.texels, CHANNELS * (left + high)), load4(scene.texels, CHANNELS * (right + high)), s)
     return _mixed(lower, upper, t)
 
 
 @inlined
 def _mixed(a, b, share):
-    return (
-        a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share,
-        a[2] + (b[2] - a[2]) * share, a[3] + (b[3] - a[3]) * share,
-    )  # fmt: skip
+    return a + (b - a) * share
