@@ -47,7 +47,6 @@ class Materials:
         extensions = entry.get("extensions") or {}
         unread = [name for name in extensions if name not in _READ]
         transmission = extensions.get("KHR_materials_transmission") or {}
-        unread += ["transmissionTexture"] if "transmissionTexture" in transmission else []
         if unread:
             self._reading.note("left out of materials:", unread)
         strength = (extensions.get("KHR_materials_emissive_strength") or {}).get("emissiveStrength", 1.0)
@@ -69,6 +68,7 @@ class Materials:
             alpha_mode=str(entry.get("alphaMode", "OPAQUE")).lower(),  # type: ignore[arg-type]  # which is checked
             alpha_cutoff=entry.get("alphaCutoff", 0.5),
             transmission=through,
+            transmission_texture=self._texture(transmission.get("transmissionTexture")),
             transmission_color=(red, green, blue) if through else (1.0, 1.0, 1.0),
             ior=(extensions.get("KHR_materials_ior") or {}).get("ior", 1.5),
             double_sided=entry.get("doubleSided", False),

@@ -65,6 +65,8 @@ class MeshMaterial:
         Whether ``specular`` reflects other surfaces too: ``illum`` 3 to 8.
     transmission : float, default 0
         From 0 to 1: the share of light that is not reflected and goes through.
+    transmission_texture : Texture, optional
+        Its red multiplies ``transmission``.
     transmission_color : array_like, shape (3,), default (1, 1, 1)
         From 0 to 1: filters the light that goes through, ``Tf``.
     ior : float, default 1.5
@@ -109,6 +111,7 @@ class MeshMaterial:
     ambient: Color | None = None
     mirror: bool = False
     transmission: float = 0.0
+    transmission_texture: Texture | None = None
     transmission_color: Color = (1.0, 1.0, 1.0)
     ior: float = 1.5
     double_sided: bool = False

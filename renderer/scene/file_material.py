@@ -136,18 +136,23 @@ def _of_faces(mesh: Mesh, chosen: Any) -> Mesh:
 def material_of(own: MeshMaterial, colors: Space | None = None) -> Material:
     """The material of a scene that comes nearest to one of a file; ``colors`` of vertices multiply its base colour.
 
-    Metal has no diffuse share, and mirrors in its base colour; other surfaces mirror 0.04. Highlights have the exponent
-    2 / roughness^4 - 2, and the height at which they return as much light. Surfaces smoother than 0.25 also mirror what
-    is around. Textures of metal and roughness count by their means. What transmits at least half is glass.
+    Metal returns light in its base colour: evenly the share of its roughness, as pictures mirror nothing blurred, and
+    the rest in highlights and mirrored. Other surfaces mirror 0.04. Highlights have the exponent 2 / roughness^4 - 2,
+    and the height at which they return as much light. Surfaces smoother than 0.25 also mirror what is around. Textures
+    of metal, roughness and transmission count by their means. What transmits at least half is glass.
     """
     shared: dict[str, Any] = {"normal_map": own.normal_texture, "vertex_colors": colors, **_opacity(own)}
     base, texture = own.base_color, own.base_color_texture
     if own.unlit:
         return Phong(diffuse=0.0, emission=base, emission_map=texture, **shared)
-    metallic, roughness = _means(own)
-    if own.transmission >= 0.5:
-        return Dielectric(ior=own.ior, transmittance=np.multiply(own.transmission_color, own.transmission))
-    straight = _STRAIGHT + (np.array(base) - _STRAIGHT) * metallic
+    metallic = own.metallic * _mean(own.metallic_roughness_texture, 2)
+    roughness = own.roughness * _mean(own.metallic_roughness_texture, 1)
+    through = own.transmission * _mean(own.transmission_texture, 0)
+    if through >= 0.5:
+        return Dielectric(ior=own.ior, transmittance=np.multiply(own.transmission_color, through))
+    straight = _STRAIGHT * (1.0 - metallic) + np.multiply(base, metallic * (1.0 - roughness))
+    # Highlights of metal have the colours of its texture; others are white.
+    of_metal = texture if metallic >= 0.5 else None
     exponent = min(max(2.0 / max(roughness, 0.01) ** 4 - 2.0, 0.0), _SHARPEST)
     specular = np.minimum(straight * (exponent + 2.0) / 2.0, 1.0)
     mirrored = straight * max(1.0 - roughness / _BLURRED, 0.0)
@@ -156,13 +161,14 @@ def material_of(own: MeshMaterial, colors: Space | None = None) -> Material:
         exponent = 32.0 if own.shininess is None else own.shininess
         mirrored = specular if own.mirror else np.zeros(3)
     return Phong(
-        diffuse=np.multiply(base, (1.0 - metallic) * (1.0 - own.transmission)),
+        diffuse=np.multiply(base, (1.0 - metallic * (1.0 - roughness)) * (1.0 - through)),
         diffuse_map=texture,
         specular=specular,
-        specular_map=own.specular_texture if own.specular is not None else None,
+        specular_map=of_metal if own.specular is None else own.specular_texture,
         shininess=exponent,
         reflectance=np.minimum(mirrored, 1.0),
-        transmittance=np.multiply(own.transmission_color, own.transmission),
+        reflectance_map=of_metal,
+        transmittance=np.multiply(own.transmission_color, through),
         ior=own.ior,
         emission=own.emissive,
         emission_map=own.emissive_texture,
@@ -170,15 +176,14 @@ def material_of(own: MeshMaterial, colors: Space | None = None) -> Material:
     )
 
 
-def _means(own: MeshMaterial) -> tuple[float, float]:
-    """Metal and roughness, of a texture the means."""
-    texture = own.metallic_roughness_texture
-    if texture is None or texture.image.pixels.shape[2] < 3:
-        return own.metallic, own.roughness
+def _mean(texture: Texture | None, channel: int) -> float:
+    """The mean of a channel of a texture, from 0 to 1, of a grey one its grey; 1 for none."""
+    if texture is None:
+        return 1.0
     pixels = texture.image.pixels
     most = 1.0 if pixels.dtype.kind == "f" else float(np.iinfo(pixels.dtype).max)
-    green, blue = (float(pixels[..., channel].mean(dtype=np.float64)) / most for channel in (1, 2))
-    return own.metallic * min(blue, 1.0), own.roughness * min(green, 1.0)
+    values = pixels[..., channel if pixels.shape[2] >= 3 else 0]
+    return min(max(float(values.mean(dtype=np.float64)) / most, 0.0), 1.0)
 
 
 def _opacity(own: MeshMaterial) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from renderer.scene.vectors import unit
 
 # The ball around the mesh, seen from a little above and to the right, fills the picture's height less a tenth.
 _TOWARDS_EYE, _FOV, _MARGIN = (0.5, 0.4, 1.0), 40.0, 1.1
+_GAP = 2.0**-10
 # Half the side of the floor, in radii.
 _FLOOR = 6.0
 _MODEL, _FLOOR_GREY = (0.62, 0.56, 0.48), 0.75
@@ -54,7 +55,8 @@ def showcase_text(meshes: Sequence[Mesh], paths: Sequence[str], up: str) -> str:
     axis, turn, target = UP_AXES[up], turn_to(up), np.zeros(3)
     target[axis] = float(extent[axis]) / 2.0
     moved = -(lower + upper) / 2.0
-    moved[axis] = -lower[axis]
+    # Above the floor by so little that it does not show, so that parts that lie flat there do.
+    moved[axis] = _GAP * radius - lower[axis]
     towards = turn @ _TOWARDS_EYE / np.linalg.norm(_TOWARDS_EYE)
     eye = target + towards * (_MARGIN * radius / math.sin(math.radians(_FOV) / 2.0))
     half, sky = _FLOOR * radius, _studio(up)

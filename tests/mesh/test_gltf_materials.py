@@ -92,6 +92,12 @@ def test_fields_and_defaults_are_those_of_the_format(entry: dict[str, Any], fiel
     assert read(entry) == MeshMaterial(**{"metallic": 1.0, **fields})
 
 
+def test_a_texture_of_transmission_is_read() -> None:
+    entry = {"extensions": {"KHR_materials_transmission": {"transmissionTexture": {"index": 0}}}}
+    found = read(entry, textures=[{"source": 0}], images=[{"uri": URI}])
+    assert list(found.textures) == ["transmission_texture"]
+
+
 def test_faces_have_the_material_of_their_primitive_and_equal_ones_are_one() -> None:
     mesh = load_mesh(glb([{"name": "a"}, {"name": "b"}, {"name": "a"}], rows=(1, None, 2, 0)))
     assert mesh.face_materials is not None
@@ -185,8 +191,6 @@ USED = {"emissiveTexture": {"index": 0}}
         (USED, {"textures": [{"extensions": {"KHR_texture_basisu": {"source": 0}}}]}, "read: KHR_texture_basisu"),
         ({"emissiveTexture": {"index": 0, "texCoord": 1}}, {}, "left out: textures on TEXCOORD_1, as a mesh has one"),
         ({"extensions": {"KHR_materials_sheen": {}}}, {}, "left out of materials: KHR_materials_sheen"),
-        ({"extensions": {"KHR_materials_transmission": {"transmissionTexture": {"index": 0}}}}, {},
-         "left out of materials: transmissionTexture"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_read_is_named_and_the_mesh_loads(entry: Any, document: Any, note: str) -> None:

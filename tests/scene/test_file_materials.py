@@ -24,23 +24,34 @@ from renderer.mesh.shapes import box, icosphere
 from renderer.scene.file_material import material_of, parts_of_file
 from renderer.scene.scene import write_scene
 
+GREY = Texture(np.full((1, 1, 3), 0.5, np.float32))
 pytestmark = pytest.mark.judges("load_scene", "scene.objects.material")
 
 
-def test_metal_has_no_diffuse_share_and_mirrors_in_its_colour() -> None:
+def test_smooth_metal_mirrors_and_rough_metal_scatters_in_its_colour() -> None:
     gold = (1.0, 0.8, 0.3)
     metal = material_of(MeshMaterial(base_color=gold, metallic=1.0, roughness=0.0))
     assert isinstance(metal, Phong)
     assert metal.diffuse == (0.0, 0.0, 0.0) and metal.reflectance == pytest.approx(gold)
     rough = material_of(MeshMaterial(base_color=gold, metallic=1.0, roughness=1.0))
-    # An exponent of 0, whose highlight returns as much light as arrives.
     assert isinstance(rough, Phong)
-    assert rough.shininess == 0.0 and rough.specular == pytest.approx(gold) and not any(rough.reflectance)
+    assert rough.shininess == 0.0 and rough.diffuse == pytest.approx(gold)
+    assert not any(rough.specular) and not any(rough.reflectance)
+    half = material_of(
+        MeshMaterial(base_color=gold, metallic=1.0, roughness=0.5, base_color_texture=Texture(np.ones((1, 1, 3))))
+    )
+    assert isinstance(half, Phong) and half.specular_map == half.diffuse_map
+    # Highlights whose height and exponent return what is not scattered.
+    assert half.diffuse == pytest.approx(np.divide(gold, 2)) and half.shininess == 30.0
+    halved = material_of(MeshMaterial(base_color=gold, metallic=1.0, roughness=0.5, metallic_roughness_texture=GREY))
+    assert isinstance(halved, Phong) and halved.diffuse == pytest.approx(np.multiply(gold, 1 - 0.5 * 0.75))
 
 
 def test_glass_unlit_and_highlights_of_mtl() -> None:
     glass = material_of(MeshMaterial(transmission=0.9, ior=1.3, transmission_color=(0.5, 1, 1)))
     assert isinstance(glass, Dielectric) and glass.ior == 1.3 and glass.transmittance == pytest.approx((0.45, 0.9, 0.9))
+    partly = material_of(MeshMaterial(transmission=0.9, transmission_texture=GREY))
+    assert isinstance(partly, Phong) and partly.transmittance == pytest.approx((0.45,) * 3)
     unlit = material_of(MeshMaterial(base_color=(0.1, 0.2, 0.3), unlit=True))
     assert isinstance(unlit, Phong) and unlit.emission == (0.1, 0.2, 0.3) and not unlit.receives_light
     shiny = material_of(MeshMaterial(specular=(0.3, 0.3, 0.3), shininess=70.0, mirror=True))

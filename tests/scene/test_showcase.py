@@ -10,7 +10,7 @@ from cases import cases
 from renderer import Mesh, SceneError, load_scene, render
 from renderer.cli.main import main
 from renderer.mesh.load import save_ply
-from renderer.mesh.shapes import box, icosphere, torus
+from renderer.mesh.shapes import box, grid, icosphere, torus
 from renderer.scene.scene import write_scene
 
 SHAPES = {
@@ -97,9 +97,18 @@ def test_several_meshes_are_objects_of_one_scene(pair: Path, capsys: Any) -> Non
     bounds = [part.mesh.bounds for part in scene.instances[:2]]
     count = len(scene.instances[0].mesh.faces)
     assert (image.face < count).any() and ((image.face >= count) & (image.face < count + 1280)).any()
-    assert min(lower[1] for lower, _ in bounds) == 0.0
+    assert 0.0 < min(lower[1] for lower, _ in bounds) < 1e-3 * np.ptp(bounds, axis=(0, 1)).max()
     apart = SHAPES["ball"].bounds[0][0] + 5 - SHAPES["ring"].bounds[0][0]
     assert bounds[1][0][0] - bounds[0][0][0] == pytest.approx(apart)
+
+
+def test_a_flat_mesh_is_seen_on_the_floor(tmp_path: Path) -> None:
+    grid(3, 3).save(tmp_path / "flat.ply")
+    scene = load_scene(tmp_path / "flat.ply")
+    mesh = scene.instances[0].mesh
+    pixels, _ = scene.camera.project(mesh.triangles.mean(axis=1), 60)
+    columns, rows = np.floor(pixels).astype(int).T
+    assert (render(scene, resolution=60).face[rows, columns] < len(mesh.faces)).all()
 
 
 def test_of_several_meshes_one_line_says_which_axis_is_taken(pair: Path, capsys: Any) -> None:
