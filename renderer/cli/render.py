@@ -19,6 +19,7 @@ _CHANGE = (
     "replace the camera, the lights, materials, the ambient light, the background or sky, or keys of render, such as "
     "'render.shadows = false', or leave objects out, such as 'hide = [\"objects.0\", \"floor\"]'; may be given again"
 )
+_FILTERS = ("box", "tent", "gaussian", "mitchell")
 _EXPOSURE = "make the picture 2^STOPS times as bright; default: 0"
 _TRANSPARENT = "for a .png: leave the background out, with alpha in its place"
 _ACCELERATOR = "default: auto, the octree unless there are very few faces; brute tests all faces"
@@ -35,6 +36,7 @@ def add_render(commands: Any) -> None:
     )
     render.add_argument("--max-depth", type=int, metavar="N", help="bounces, 0 to 64")
     render.add_argument("--samples", type=int, metavar="N", help="samples per pixel: 1, 4, 9, ...")
+    render.add_argument("--filter", choices=_FILTERS, help="how samples become pixels (default: box)")
     render.add_argument("--min-weight", type=float, metavar="W", help="end rays whose weight is less")
     render.add_argument("--max-rays", type=int, metavar="N", help="the most rays per sample of a pixel")
     render.add_argument("--exposure", type=stops, default=0.0, metavar="STOPS", help=_EXPOSURE)
@@ -77,7 +79,7 @@ def _render(options: argparse.Namespace) -> None:
     check_picture_path(options.output)
     _check_transparent(options)
     scene = _scene(options)
-    names = ("resolution", "samples", "max_depth", "min_weight", "max_rays", "accelerator", "split")
+    names = ("resolution", "samples", "filter", "max_depth", "min_weight", "max_rays", "accelerator", "split")
     asked: dict[str, Any] = {name: getattr(options, name) for name in names}
     asked["planes"] = PLANES if options.output.suffix.lower() == ".exr" else ("rays",)
     if options.cluster is None:

@@ -119,7 +119,7 @@ class Image:
     Attributes
     ----------
     radiance : ndarray, shape (height, width, 3), float32
-        Linear radiance, the mean of the samples of a pixel.
+        Linear radiance, the mean of a pixel's samples by the weights of the filter.
     depth : ndarray, shape (height, width), float64
         The distance from the origin of the camera ray; inf for a miss.
     normal : ndarray, shape (height, width, 3), float32

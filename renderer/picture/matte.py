@@ -22,12 +22,14 @@ from renderer.trace.spawn import BOUNDED
 class Matte:
     """What the camera rays of a picture hit.
 
-    hits        the number of a pixel's samples that hit a surface, (h, w) int64
+    hits        the sum of the weights of a pixel's samples that hit a surface, (h, w) float64: their number, but for
+                filters that are negative somewhere, and clipped to that of all samples
     samples     the number of samples of each pixel
-    background  the sum over the other samples of the radiance that they see, divided by ``samples``, (h, w, 3) float32
+    background  the weighted sum over the other samples of the radiance that they see, divided by ``samples``, (h, w, 3)
+                float32
     """
 
-    hits: NDArray[np.int64]
+    hits: NDArray[np.float64]
     samples: int
     background: NDArray[np.float32]
 
@@ -63,7 +65,9 @@ def matte_of(
         return shown.picture(camera, direct, BOUNDED, threads, finished, (), band).radiance
 
     share = seen(1.0, np.zeros(3), sky[:0])[..., 0].astype(np.float64)
-    hits = np.rint(chosen.samples * share).astype(np.int64)
+    hits = np.clip(chosen.samples * share, 0.0, chosen.samples)
+    if chosen.filter != "mitchell":  # all samples count 1, up to the rounding of float32
+        hits = np.rint(hits)
     return Matte(hits, chosen.samples, seen(0.0, colors[1], sky))
 
 
@@ -85,7 +89,7 @@ def cut_out(radiance: NDArray[np.float32], matte: Matte) -> NDArray[np.uint8]:
     """
     alpha, misses = matte.alpha, matte.samples - matte.hits
     share = (alpha / 255.0)[..., None]
-    behind = matte.background * (matte.samples / np.maximum(misses, 1))[..., None]
+    behind = matte.background * (matte.samples / np.where(misses > 0.0, misses, 1.0))[..., None]
     seen = alpha > 0
     colors = (radiance - (1.0 - share) * behind)[seen] / share[seen]
     pixels = np.zeros((*alpha.shape, 4), np.uint8)

@@ -30,6 +30,7 @@ PICTURES: dict[str, tuple[str, Any]] = {
     "--resolution": ("7x5", {"resolution": (7, 5)}),
     "--max-depth": ("1", {"max_depth": 1}),
     "--samples": ("9", {"samples": 9}),
+    "--filter": ("tent", {"filter": "tent"}),
     "--min-weight": ("0.25", {"min_weight": 0.25}),
     "--max-rays": ("5", {"max_rays": 5}),
     "--accelerator": ("brute", {"accelerator": "brute"}),

@@ -11,10 +11,10 @@ from cases import cases
 from renderer.diagnostics import tree_boxes
 from renderer.mesh import obj, polygons
 from renderer.octree import Octree
-from renderer.picture import camera_rays, image, pack, prepare
+from renderer.picture import image, pack, prepare
 from renderer.queryable import Queries
 from renderer.results import hits
-from renderer.scene import scene
+from renderer.scene import filters, scene
 from renderer.trace.layout import Tree
 from validation.promises.hits import (
     alone,
@@ -191,7 +191,7 @@ def test_scaling_in_another_order_is_found(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_samples_at_one_place_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(camera_rays, "sample_offsets", lambda samples: np.full((samples, 2), 0.5))
+    monkeypatch.setattr(filters, "sample_offsets", lambda samples: np.full((samples, 2), 0.5))
     assert broken("floors") == {"samples lie"}
 
 
