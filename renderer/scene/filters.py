@@ -70,7 +70,6 @@ def film_samples(name: str, samples: int) -> tuple[NDArray[np.float64], NDArray[
         return places, np.ones(samples)
     across, weights = _along_axis(name, math.isqrt(samples))
     y, x = np.meshgrid(across, across, indexing="ij")
-    # rule: filter-place
     return 0.5 + np.stack([x.ravel(), y.ravel()], axis=1), np.outer(weights, weights).ravel()
 
 

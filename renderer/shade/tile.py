@@ -174,7 +174,6 @@ def _end_sample(film, block, scratch, total, weight):
             color = row3(scratch.color, pixel)
             # Infinities of either sign would be no number together.
             color = minimum(color[0], _FINITE), minimum(color[1], _FINITE), minimum(color[2], _FINITE)
-            # rule: filter-weight
             put3(total, 3 * pixel, add(row3(total, pixel), scale(color, weight)))
             if len(film.rays) > 0:
                 film.rays[y, x] += load(scratch.traced, pixel)

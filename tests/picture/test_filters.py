@@ -1,6 +1,5 @@
 """Reconstruction filters: their shapes, and pictures whose integrals are known."""
 
-import math
 from typing import Any
 
 import numpy as np
@@ -21,42 +20,9 @@ from renderer import (
     shapes,
 )
 from renderer.scene.filters import film_samples
+from validation.promises.pictures.reconstruction import FILTERS, published
 
 pytestmark = pytest.mark.judges("scene.render.filter", "octree-render render --filter")
-
-FILTERS = ["box", "tent", "gaussian", "mitchell"]
-
-
-def shape(name: str, x: Any) -> Any:
-    """The filters' formulas as published, with the radii and widths of Mitsuba's defaults, up to a factor."""
-    x = np.abs(x)
-    if name == "box":
-        return np.where(x <= 0.5, 1.0, 0.0)
-    if name == "tent":
-        return np.maximum(1.0 - x, 0.0)
-    if name == "gaussian":
-        return np.maximum(np.exp(-(x**2) / (2.0 * 0.5**2)) - math.exp(-(2.0**2) / (2.0 * 0.5**2)), 0.0)
-    b = c = 1.0 / 3.0
-    near = (12 - 9 * b - 6 * c) * x**3 + (-18 + 12 * b + 6 * c) * x**2 + 6 - 2 * b
-    far = (-b - 6 * c) * x**3 + (6 * b + 30 * c) * x**2 + (-12 * b - 48 * c) * x + 8 * b + 24 * c
-    return np.where(x < 1.0, near, np.where(x < 2.0, far, 0.0)) / 6.0
-
-
-GRID = np.linspace(-2.5, 2.5, 50001)
-
-
-def up_to(name: str, x: Any) -> Any:
-    """The integral of a filter from the left up to ``x``."""
-    sums = np.cumsum(shape(name, 0.5 * (GRID[1:] + GRID[:-1])))
-    return np.interp(x, GRID, np.append(0.0, sums / sums[-1]))
-
-
-def strip(edge: float, **settings: Any) -> Any:
-    """Eight pixels of radiance 1 left of a vertical edge, 0 right of it."""
-    camera = OrthographicCamera(eye=(4.0, 0.5, 5.0), target=(4.0, 0.5, 0.0), height=1.0)
-    wall = SceneObject(mesh=shapes.box(), material="lit", scale=(20.0 + edge, 20.0, 1.0), translate=(-20.0, -10.0, 0.0))
-    scene = Scene(camera=camera, materials={"lit": Phong(diffuse=0, emission=1)}, objects=[wall])
-    return render(scene, resolution=(8, 1), **settings)
 
 
 @cases("name", FILTERS)
@@ -70,29 +36,11 @@ def test_places_and_weights_are_even_and_keep_a_constant(name: str, samples: int
 
 
 @cases("name", FILTERS)
-def test_samples_are_spread_as_the_filter_is(name: str) -> None:
-    """Along an axis, within the share of one sample."""
-    places, weights = film_samples(name, 256**2)
-    x, share = places[:256, 0] - 0.5, weights.reshape(256, 256).mean(axis=0)
-    found = np.cumsum(share) / 256 - 0.5 * share / 256
-    assert np.abs(found - up_to(name, x)).max() < 1e-6
-
-
-@cases("name", FILTERS)
 def test_shapes_are_mitsubas(name: str, mitsuba: Any) -> None:
     theirs = mitsuba.load_dict({"type": name})
     x = np.linspace(-2.5, 2.5, 1001) + 1e-4
     values = [float(theirs.eval(float(place))) if abs(place) < theirs.radius() else 0.0 for place in x]
-    assert np.abs(values - shape(name, x)).max() < 5e-4  # their exponential is approximate
-
-
-@cases("name", FILTERS)
-@cases("edge", [4.0, 4.3, 4.5, 4.85])
-def test_an_edge_has_the_filters_integral(name: str, edge: float) -> None:
-    found = strip(edge, samples=4096, filter=name).radiance[0, :, 0]
-    expected = up_to(name, edge - (np.arange(8) + 0.5))
-    assert np.abs(found - expected).max() < 0.6 * film_samples(name, 4096)[1].max() / 64
-    assert (found.min() < -0.01) == (name == "mitchell" and edge in (4.3, 4.5))
+    assert np.abs(values - published(name, x)).max() < 5e-4  # their exponential is approximate
 
 
 @cases("name", FILTERS)

@@ -11,7 +11,7 @@ from cases import cases
 from renderer.diagnostics import tree_boxes
 from renderer.mesh import obj, polygons
 from renderer.octree import Octree
-from renderer.picture import image, pack, prepare
+from renderer.picture import camera_rays, image, pack, prepare
 from renderer.queryable import Queries
 from renderer.results import hits
 from renderer.scene import filters, scene
@@ -42,6 +42,7 @@ from validation.promises.pictures import (
     nesting,
     openings,
     placing,
+    reconstruction,
     refraction,
     saved,
     shining,
@@ -72,6 +73,7 @@ CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "placing": lambda: placing.check_placing(np.random.default_rng(5), 12),
     "floors": floors.check_floors,
     "bounces": bounces.check_bounces,
+    "filters": reconstruction.check_filters,
     "nesting": nesting.check_nesting,
     "shining": shining.check_shining,
     "images": lambda: images.check_images(np.random.default_rng(5)),
@@ -193,6 +195,14 @@ def test_scaling_in_another_order_is_found(monkeypatch: pytest.MonkeyPatch) -> N
 def test_samples_at_one_place_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(filters, "sample_offsets", lambda samples: np.full((samples, 2), 0.5))
     assert broken("floors") == {"samples lie"}
+
+
+def test_a_filter_of_another_width_or_weight_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = camera_rays.film_samples
+    changes = [lambda p, w: (0.8 * (p - 0.5) + 0.5, w), lambda p, w: (p, np.ones_like(w))]
+    for change in changes:
+        monkeypatch.setattr(camera_rays, "film_samples", lambda *told, change=change: change(*sound(*told)))
+        assert broken("filters") == {"a pixel"}
 
 
 def test_a_light_that_is_left_out_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
