@@ -11,6 +11,7 @@ from renderer.picture.encoding import write_pixels
 from renderer.picture.exposure import exposed
 from renderer.picture.image import srgb
 from renderer.picture.prepare import PreparedScene
+from renderer.picture.tone import toned
 from renderer.scene.camera import Camera
 from renderer.scene.scene import RenderSettings
 from renderer.shade.records import AMBIENT, KIND, UNLIT
@@ -81,11 +82,12 @@ def _unlit(prepared: PreparedScene) -> PreparedScene:
     return replace(prepared, needs=needs, arrays=alone)
 
 
-def cut_out(radiance: NDArray[np.float32], matte: Matte) -> NDArray[np.uint8]:
+def cut_out(radiance: NDArray[np.float32], matte: Matte, tone: str = "srgb") -> NDArray[np.uint8]:
     """The pixels of a transparent picture, (h, w, 4): sRGB that is not multiplied by alpha, and alpha.
 
     Linear colours over the background, by alpha in 255ths, are ``radiance`` again. Alpha is rounded up, so that each
-    colour lies between that of the surface and of the background, and is one that sRGB has if both are.
+    colour lies between that of the surface and of the background, and is one that sRGB has if both are. A tone curve
+    is that of the surface alone.
     """
     alpha, misses = matte.alpha, matte.samples - matte.hits
     share = (alpha / 255.0)[..., None]
@@ -93,10 +95,10 @@ def cut_out(radiance: NDArray[np.float32], matte: Matte) -> NDArray[np.uint8]:
     seen = alpha > 0
     colors = (radiance - (1.0 - share) * behind)[seen] / share[seen]
     pixels = np.zeros((*alpha.shape, 4), np.uint8)
-    pixels[seen] = np.column_stack([srgb(colors), alpha[seen]])
+    pixels[seen] = np.column_stack([srgb(toned(colors, tone)), alpha[seen]])
     return pixels
 
 
-def save_cut_out(path: str | os.PathLike[str], radiance: NDArray[np.float32], matte: Matte) -> None:
+def save_cut_out(path: str | os.PathLike[str], radiance: NDArray[np.float32], matte: Matte, tone: str = "srgb") -> None:
     """Write a transparent picture as a PNG file, whole or not at all."""
-    write_atomically(path, lambda file: write_pixels(file, cut_out(radiance, matte)))
+    write_atomically(path, lambda file: write_pixels(file, cut_out(radiance, matte, tone)))

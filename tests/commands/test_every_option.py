@@ -46,8 +46,8 @@ HERE = {
     "view": {"scene", "--up", "--write-scene", "--host", "--port", "--no-browser"},
     "compile": {"--queries", "--pictures", "--all", "--level", "--output", "--quiet"},
 }
-# tests/scene/test_every_change.py, tests/scene/test_up.py, tests/picture/test_matte.py
-ELSEWHERE = {"render": {"--change", "--up", "--exposure", "--transparent"}}
+# tests/scene/test_every_change.py, tests/scene/test_up.py, tests/picture/test_matte.py, test_tone.py, test_turntable.py
+ELSEWHERE = {"render": {"--change", "--up", "--exposure", "--transparent", "--tone", "--frames"}}
 
 
 def commands() -> dict[str, argparse.ArgumentParser]:

@@ -164,7 +164,7 @@ PICTURES = {
     "files of pictures": Check(check_saved, ("Image.save",)),
     "nested media": Check(check_nesting, ("Dielectric",)),
     "refraction": Check(lambda: check_refraction(_random(), _REFRACTED), ("Dielectric",)),
-    "codes": Check(check_codes, ("srgb",)),
+    "codes": Check(check_codes, ("srgb", "Image.toned")),
     "boxes shown": Check(lambda: check_openings(_random(), _OPENED), ()),
 }
 SCENES = {

@@ -253,6 +253,12 @@ def test_codes_a_step_off_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     assert broken("codes") == {"float32 numbers"}
 
 
+def test_a_tone_curve_a_step_off_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = codes.toned
+    monkeypatch.setattr(codes, "toned", lambda radiance, tone: sound(radiance * np.float32(1.001), tone))
+    assert broken("codes") == {"tone curves"}
+
+
 def test_a_cosine_without_its_last_digits_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     def lossy(d: Any, n: Any, n1: float, n2: float) -> Any:
         return np.sqrt(max(1e-300, 1.0 - (n1 / n2) ** 2 * d[0] ** 2)), None

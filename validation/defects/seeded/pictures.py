@@ -192,6 +192,10 @@ _CHANGES: dict[str, Change] = {
     "offset 1e-2": Wrapped("render._offset", _far_bounded),
     "sRGB applied twice": Wrapped("image._encoded", _encoded_twice),
     "sRGB cut off instead of rounded": Rule("rounded-encoding", without("+", 1)),
+    "Reinhard's curve by the brightest channel": Rule(
+        "tone-by-luminance", value("np.maximum(red, np.maximum(green, blue))")
+    ),
+    "the curve of ACES without its toe": Rule("aces-fit", value("_ + 0.1 * x / (1.0 + x)")),
     "radiance already in sRGB": _on_film(_encoded_radiance),
     "background 2 % darker": _packed(lambda arrays: arrays._replace(colors=arrays.colors * [[1.0], [0.98]])),
     "no ambient light": _packed(lambda arrays: arrays._replace(colors=arrays.colors * [[0.0], [1.0]])),
