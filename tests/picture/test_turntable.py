@@ -58,9 +58,9 @@ def test_frames_are_the_pictures_of_the_turned_cameras(scene: Any, tmp_path: Pat
         assert read.format == suffix.upper() and read.n_frames == 5 and read.info["loop"] == 0
         for number, frame in enumerate(expected):
             read.seek(number)
-            assert read.info["duration"] == 800
             # GIF has 256 colours, which are more than 80 pixels have.
             assert np.array_equal(np.asarray(read.convert("RGB")), frame)
+            assert read.info["duration"] == 800
     assert [path.name for path in tmp_path.glob("*a.*")] == [f"a.{suffix}"]
 
 
