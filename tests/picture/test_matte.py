@@ -73,7 +73,8 @@ def test_over_its_background_it_is_the_picture_again(
         some = seen if lobes else matte.hits < samples
         assert np.allclose(behind[some], expected, rtol=1e-4 if lobes else 1e-6, atol=0)
     over = alpha * decoded(found[..., :3]) + (1.0 - alpha) * behind
-    assert np.abs(srgb(over).astype(int) - srgb(radiance)).max() <= 1
+    whole = ((found[..., :3] > 0) & (found[..., :3] < 255)).all(axis=2) | (filter != "mitchell")  # else clipped
+    assert np.abs(srgb(over).astype(int) - srgb(radiance))[whole].max() <= 1
     assert ((found[..., 3] == 0) == (matte.hits == 0)).all()
     assert srgb(radiance).max() < 255 and (samples == 1 or ((matte.hits > 0) & (matte.hits < samples)).any())
 
