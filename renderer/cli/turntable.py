@@ -39,30 +39,34 @@ def render_turntable(scene: Any, asked: dict[str, Any], options: argparse.Namesp
     width, height = checked_settings(scene.render, given, scene.camera).resolution
     even = format != "mp4" or width % 2 == height % 2 == 0
     expect(even, "--resolution", "even numbers for an .mp4 file", f"{width} x {height}")
-    began = time.perf_counter()
+    began, cuts = time.perf_counter(), list[tuple[int, str]]()
     compile_in_two()
     warnings.simplefilter("ignore", CutWarning)  # reported on one line
     with progress_bar(count, "frame", not options.quiet) as update:
-        frames = _frames(scene, asked, options, update)
+        frames = _frames(scene, asked, options, update, cuts)
         write_atomically(options.output, lambda file: write_animation(file, frames, count, format))
+    if max(cuts)[0]:
+        print(f"octree-render: in a frame {max(cuts)[1]}", file=sys.stderr)
     if not options.quiet:
         say(f"{options.output}: {count} frames of {width} x {height} in {time.perf_counter() - began:.2f} s")
 
 
-def _frames(scene: Any, asked: dict[str, Any], options: argparse.Namespace, update: Any) -> Iterator[Any]:
-    """The pixels of all frames, each rendered when it is its turn, and all of one tree."""
+def _frames(
+    scene: Any, asked: dict[str, Any], options: argparse.Namespace, update: Any, cuts: list[tuple[int, str]]
+) -> Iterator[Any]:
+    """The pixels of all frames, each rendered when it is its turn, and all of one tree.
+
+    ``cuts`` gets the number of cut pixels of each, and what is said of them.
+    """
     from renderer.picture.render import prepare, render
     from renderer.picture.turntable import turned_cameras
 
     tree = {name: asked[name] for name in ("accelerator", "split")}
     settings = {name: value for name, value in asked.items() if name not in tree} | {"planes": ()}
-    ready, worst = prepare(scene, **tree, threads=options.threads), None
+    ready = prepare(scene, **tree, threads=options.threads)
     for camera in turned_cameras(scene, options.frames):
         image = render(ready, camera=camera, threads=options.threads, **settings)
-        worst = image if worst is None or image.cut > worst.cut else worst
-        yield image.toned(options.tone, exposure=options.exposure).srgb
+        cuts.append((image.cut, image.cut_message(options.max_rays or scene.render.max_rays)))
         if update is not None:
             update(1)
-    if worst is not None and worst.cut:
-        said = worst.cut_message(options.max_rays or scene.render.max_rays)
-        print(f"octree-render: in a frame {said}", file=sys.stderr)
+        yield image.toned(options.tone, exposure=options.exposure).srgb

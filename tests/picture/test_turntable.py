@@ -105,8 +105,9 @@ def test_nothing_is_left_of_one_that_is_stopped(
     assert capsys.readouterr().err == "octree-render: interrupted\n"
 
 
-def test_cut_pixels_are_said_once(scene: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert rendered(tmp_path, "a.gif", "--frames", 3, "--max-rays", 5) == 0
+@pytest.mark.parametrize("suffix", ["gif", "webp"])
+def test_cut_pixels_are_said_once(scene: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str], suffix: str) -> None:
+    assert rendered(tmp_path, f"a.{suffix}", "--frames", 3, "--max-rays", 5) == 0
     most = max(picture(scene, camera=camera, max_rays=5).cut for camera in turned_cameras(scene, 3))
     said = capsys.readouterr().err
     assert said.startswith(f"octree-render: in a frame {most} of 80 pixels miss rays") and said.count("\n") == 1
