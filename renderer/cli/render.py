@@ -6,12 +6,12 @@ import os
 import sys
 import tempfile
 import warnings
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from renderer.cli.cluster import add_cluster, render_on_cluster
 from renderer.cli.scene import SPLIT, add_scene, say_up, write_scene_of
+from renderer.cli.turntable import add_frames, render_turntable
 from renderer.errors import expect
 from renderer.system.terminal import say
 
@@ -19,7 +19,9 @@ _CHANGE = (
     "replace the camera, the lights, materials, the ambient light, the background or sky, or keys of render, such as "
     "'render.shadows = false', or leave objects out, such as 'hide = [\"objects.0\", \"floor\"]'; may be given again"
 )
+_FILTERS = ("box", "tent", "gaussian", "mitchell")
 _EXPOSURE = "make the picture 2^STOPS times as bright; default: 0"
+_TONE = "the tone curve of a .png or an animation; default: srgb, which clips what is brighter than white"
 _TRANSPARENT = "for a .png: leave the background out, with alpha in its place"
 _ACCELERATOR = "default: auto, the octree unless there are very few faces; brute tests all faces"
 
@@ -28,17 +30,20 @@ def add_render(commands: Any) -> None:
     """Add the command to a parser's ``commands``."""
     render = commands.add_parser("render", help="render a scene file or meshes to a picture")
     add_scene(render, several=True)
-    formats = ".png, or .exr or .npy for linear radiance"
+    formats = ".png, or .exr or .npy for linear radiance; with --frames .gif, .webp or .mp4"
     render.add_argument("-o", "--output", type=Path, default=Path("out.png"), help=formats)
     render.add_argument(
         "--resolution", type=resolution, metavar="WxH", help="pixels, such as 640x360; one number is both"
     )
     render.add_argument("--max-depth", type=int, metavar="N", help="bounces, 0 to 64")
     render.add_argument("--samples", type=int, metavar="N", help="samples per pixel: 1, 4, 9, ...")
+    render.add_argument("--filter", choices=_FILTERS, help="how samples become pixels (default: box)")
     render.add_argument("--min-weight", type=float, metavar="W", help="end rays whose weight is less")
     render.add_argument("--max-rays", type=int, metavar="N", help="the most rays per sample of a pixel")
     render.add_argument("--exposure", type=stops, default=0.0, metavar="STOPS", help=_EXPOSURE)
+    render.add_argument("--tone", choices=("srgb", "reinhard", "aces"), default="srgb", help=_TONE)
     render.add_argument("--transparent", action="store_true", help=_TRANSPARENT)
+    add_frames(render)
     render.add_argument("--change", action="append", default=[], metavar="TOML", help=_CHANGE)
     render.add_argument("--accelerator", choices=("auto", "octree", "brute"), default="auto", help=_ACCELERATOR)
     render.add_argument("--split", choices=("midpoint", "sah"), default="midpoint", help=SPLIT)
@@ -72,20 +77,24 @@ def stops(text: str) -> float:
 
 def _render(options: argparse.Namespace) -> None:
     # Imported here so that --help and --version need no compiler.
+    from renderer.picture.animation import check_animation_path
     from renderer.picture.image import PLANES, check_picture_path
 
-    check_picture_path(options.output)
-    _check_transparent(options)
+    _check_encoding(options)
+    (check_picture_path if options.frames is None else check_animation_path)(options.output)
     scene = _scene(options)
-    names = ("resolution", "samples", "max_depth", "min_weight", "max_rays", "accelerator", "split")
+    names = ("resolution", "samples", "filter", "max_depth", "min_weight", "max_rays", "accelerator", "split")
     asked: dict[str, Any] = {name: getattr(options, name) for name in names}
     asked["planes"] = PLANES if options.output.suffix.lower() == ".exr" else ("rays",)
+    if options.frames is not None:
+        render_turntable(scene, asked, options)
+        return
     if options.cluster is None:
         image, matte = _rendered_here(scene, asked, options)
-        _save(_exposed(image, options), options.output, matte and matte.exposed(options.exposure))
+        _save(_developed(image, options), options, matte and matte.exposed(options.exposure))
     else:
         run, image = render_on_cluster(scene, asked, options)
-        _exposed(image, options).save(options.output)
+        _developed(image, options).save(options.output)
         # Only now, so that a file that cannot be written costs no picture.
         run.remove()
     if image.cut:
@@ -113,10 +122,16 @@ def _scene(options: argparse.Namespace) -> Any:
     return scene
 
 
-def _check_transparent(options: argparse.Namespace) -> None:
-    """Refuse a transparent picture where none is made."""
+def _check_encoding(options: argparse.Namespace) -> None:
+    """Refuse a transparent picture where none is made, and a tone curve where radiance stays linear."""
+    suffix = options.output.suffix.lower()
+    here = options.frames is None or options.cluster is None
+    expect(here, "--frames", "a turntable of this machine", "--cluster")
+    linear = options.tone != "srgb" and suffix in (".exr", ".npy")
+    expect(not linear, "--tone", "a .png file or an animation", repr(str(options.output)))
     if options.transparent:
-        expect(options.output.suffix.lower() == ".png", "--transparent", "a .png file", repr(str(options.output)))
+        expect(suffix == ".png", "--transparent", "a .png file", repr(str(options.output)))
+        expect(options.frames is None, "--transparent", "a picture", "--frames")
         expect(options.cluster is None, "--transparent", "a picture of this machine", "--cluster")
 
 
@@ -147,11 +162,9 @@ def _matte(ready: Any, options: argparse.Namespace) -> Any:
     return matte_of(ready, scene.camera, chosen, checked_threads(options.threads))
 
 
-def _exposed(image: Any, options: argparse.Namespace) -> Any:
-    """The picture with the exposure of the options."""
-    from renderer.picture.exposure import exposed
-
-    return replace(image, radiance=exposed(image.radiance, options.exposure))
+def _developed(image: Any, options: argparse.Namespace) -> Any:
+    """The picture with the exposure and tone of the options; a transparent one gets its tone without its background."""
+    return image.toned("srgb" if options.transparent else options.tone, exposure=options.exposure)
 
 
 def _summary(image: Any, options: argparse.Namespace) -> str:
@@ -177,28 +190,29 @@ def _check_output_is_no_input(options: argparse.Namespace, files: list[Path], sc
     expect(apart, "--output", "another file than the scene's own", f"{output} by a link")
 
 
-def _write(image: Any, path: Path, matte: Any) -> None:
+def _write(image: Any, path: Path, tone: str, matte: Any) -> None:
     from renderer.picture.matte import save_cut_out
 
     if matte is None or path.suffix.lower() != ".png":
         image.save(path)
     else:
-        save_cut_out(path, image.radiance, matte)
+        save_cut_out(path, image.radiance, matte, tone)
 
 
-def _save(image: Any, path: Path, matte: Any = None) -> None:
+def _save(image: Any, options: argparse.Namespace, matte: Any = None) -> None:
     """Save a picture, transparent where it has a matte. If that fails, save it in a temporary folder and raise an error
     with its path.
     """
+    path = options.output
     try:
-        _write(image, path, matte)
+        _write(image, path, options.tone, matte)
     except (OSError, MemoryError) as error:
         # Its radiance is written as it is, where there is no memory to encode it.
         name = path.name if isinstance(error, OSError) else f"{path.stem}.npy"
         folder = tempfile.mkdtemp(prefix="octree-render-")
         kept = Path(folder) / name
         try:
-            _write(image, kept, matte)
+            _write(image, kept, options.tone, matte)
         except OSError:
             os.rmdir(folder)
             raise error from None

@@ -5,7 +5,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.scene.camera import Camera, sample_offsets
+from renderer.scene.camera import Camera
+from renderer.scene.filters import film_samples
 from renderer.shade.bundle import SIDE
 from renderer.shade.tile import CameraRays, Rectangle
 
@@ -22,17 +23,19 @@ def tile_side(camera: Camera, resolution: tuple[int, int], samples: int) -> int:
     return TILE if few else SIDE
 
 
-def rays_of_tiles(camera: Camera, resolution: tuple[int, int], samples: int) -> Callable[[Rectangle], CameraRays]:
+def rays_of_tiles(
+    camera: Camera, resolution: tuple[int, int], samples: int, filter: str = "box"
+) -> Callable[[Rectangle], CameraRays]:
     """The function that gives the rays of a tile: of an affine camera the rows of its map, of others a list."""
-    places = sample_offsets(samples)
+    places, weights = film_samples(filter, samples)
     centre = samples // 2 if samples % 2 and not camera._has_lens(samples) else samples
     if centre == samples:
         places = np.concatenate([places, [[0.5, 0.5]]])
     rows = camera._rows_for(*resolution, samples)
     if rows is not None:
-        shared = CameraRays(rows, places, samples, centre)
+        shared = CameraRays(rows, places, weights, samples, centre)
         return lambda tile: shared
-    return lambda tile: CameraRays(_listed(camera, resolution, samples, places, tile), places, samples, centre)
+    return lambda tile: CameraRays(_listed(camera, resolution, samples, places, tile), places, weights, samples, centre)
 
 
 def _listed(

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
+from numbers import Real
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -17,7 +18,9 @@ from renderer.arguments.arrays import real_argument
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.picture.encoding import write_pixels
+from renderer.picture.exposure import MAX_STOPS, exposed
 from renderer.picture.exr import check_exr, exr_bytes
+from renderer.picture.tone import TONES, ToneName, toned
 from renderer.system.files import as_path, check_writable, write_atomically
 
 # The arrays of an ``Image``; radiance is always there.
@@ -119,7 +122,7 @@ class Image:
     Attributes
     ----------
     radiance : ndarray, shape (height, width, 3), float32
-        Linear radiance, the mean of the samples of a pixel.
+        Linear radiance, the mean of a pixel's samples by the weights of the filter.
     depth : ndarray, shape (height, width), float64
         The distance from the origin of the camera ray; inf for a miss.
     normal : ndarray, shape (height, width, 3), float32
@@ -238,6 +241,53 @@ class Image:
             codes[begin : begin + _ROWS] = srgb(self.radiance[begin : begin + _ROWS])
         return codes
 
+    def toned(self, tone: ToneName = "srgb", *, exposure: float = 0.0) -> Image:
+        """The picture as a screen is to show it: brighter or darker, and with a tone curve for what is too bright.
+
+        Parameters
+        ----------
+        tone : {"srgb", "reinhard", "aces"}, default "srgb"
+            "srgb": none, so that a PNG clips what is brighter than 1. "reinhard": colours divided by 1 + their
+            luminance 0.2126 R + 0.7152 G + 0.0722 B, so that hues stay; single channels may still exceed 1. "aces":
+            Narkowicz's fit of the curve of ACES, x (2.51 x + 0.03) / (x (2.43 x + 0.59) + 0.14) for each channel, at
+            most 1.
+        exposure : float, default 0
+            Stops, from -100 to 100: radiance is multiplied by 2 to their power before the curve.
+
+        Returns
+        -------
+        Image
+            Its radiance is linear, for ``srgb``, PNG files and notebooks. All else is the same.
+
+        Raises
+        ------
+        ValueError
+            For another tone or exposure.
+
+        References
+        ----------
+        Reinhard, Stark, Shirley and Ferwerda, Photographic tone reproduction for digital images, 2002. Narkowicz, ACES
+        filmic tone mapping curve, 2016.
+
+        Examples
+        --------
+        >>> from renderer import PerspectiveCamera, Scene, render
+        >>> eye = PerspectiveCamera(eye=(0, 0, 5), target=(0, 0, 0))
+        >>> sky = render(Scene(camera=eye, materials={}, background=(0.5, 2, 8)), resolution=1)
+        >>> [sky.toned(tone).srgb[0, 0].tolist() for tone in ("srgb", "reinhard", "aces")]
+        [[188, 255, 255], [112, 210, 255], [206, 245, 255]]
+        >>> sky.toned("aces", exposure=-3).srgb[0, 0].tolist()
+        [71, 165, 232]
+        """
+        expect(isinstance(tone, str) and tone in TONES, "tone", f"one of {', '.join(TONES)}", repr(tone))
+        number = isinstance(exposure, Real) and abs(exposure) <= MAX_STOPS
+        expect(number, "exposure", f"a number from {-MAX_STOPS:g} to {MAX_STOPS:g}", repr(exposure))
+        radiance = exposed(self.radiance, float(exposure))
+        if tone != "srgb":
+            rows = range(0, len(radiance), _ROWS)
+            radiance = np.concatenate([toned(radiance[begin : begin + _ROWS], tone) for begin in rows])
+        return replace(self, radiance=radiance)
+
     def _repr_png_(self) -> bytes:
         """The picture as PNG; notebooks show it."""
         buffer = io.BytesIO()
@@ -258,13 +308,19 @@ def exr_of(image: Image, beside: Path) -> bytes:
 
 def check_picture_path(path: str | os.PathLike[str]) -> None:
     """Raise ``ValueError`` or ``OSError`` unless ``save`` can write there; to be called before a long render."""
+    if check_output_path(path, (".png", ".exr", ".npy")).suffix.lower() == ".exr":
+        check_exr()
+
+
+def check_output_path(path: str | os.PathLike[str], suffixes: Sequence[str]) -> Path:
+    """The path, with one of ``suffixes``. Raises ``ValueError`` or ``OSError`` unless a file can be written there."""
     path = as_path("path", path)
-    expect(path.suffix.lower() in (".png", ".exr", ".npy"), "output", "a .png, .exr or .npy file", repr(str(path)))
+    expected = f"a {', '.join(suffixes[:-1])} or {suffixes[-1]} file"
+    expect(path.suffix.lower() in suffixes, "output", expected, repr(str(path)))
     expect(path.parent.is_dir(), "output", "a path in an existing folder", repr(str(path)))
     expect(not path.is_dir(), "output", "a file", f"the folder {str(path)!r}")
     check_writable(path)
-    if path.suffix.lower() == ".exr":
-        check_exr()
+    return path
 
 
 def write_array(file: BinaryIO, values: NDArray[Any]) -> None:

@@ -12,6 +12,7 @@ from renderer.picture.encoding import write_pixels
 from renderer.picture.exposure import exposed
 from renderer.picture.image import srgb
 from renderer.picture.prepare import PreparedScene
+from renderer.picture.tone import toned
 from renderer.scene.camera import Camera
 from renderer.scene.scene import RenderSettings
 from renderer.shade.records import EMISSION, TINTED
@@ -23,12 +24,14 @@ from renderer.trace.spawn import BOUNDED
 class Matte:
     """What the camera rays of a picture hit.
 
-    hits        the number of a pixel's samples that hit a surface, (h, w) int64
+    hits        the sum of the weights of a pixel's samples that hit a surface, (h, w) float64: their number, but for
+                filters that are negative somewhere, and clipped to that of all samples
     samples     the number of samples of each pixel
-    background  the sum over the other samples of the radiance that they see, divided by ``samples``, (h, w, 3) float32
+    background  the weighted sum over the other samples of the radiance that they see, divided by ``samples``, (h, w, 3)
+                float32
     """
 
-    hits: NDArray[np.int64]
+    hits: NDArray[np.float64]
     samples: int
     background: NDArray[np.float32]
 
@@ -64,7 +67,9 @@ def matte_of(
         return shown.picture(camera, direct, BOUNDED, threads, finished, (), band).radiance
 
     share = seen(1.0, np.zeros(3), sky[:0])[..., 0].astype(np.float64)
-    hits = np.rint(chosen.samples * share).astype(np.int64)
+    hits = np.clip(chosen.samples * share, 0.0, chosen.samples)
+    if chosen.filter != "mitchell":  # all samples count 1, up to the rounding of float32
+        hits = np.rint(hits)
     return Matte(hits, chosen.samples, seen(0.0, colors[1], sky))
 
 
@@ -81,22 +86,23 @@ def _unlit(prepared: PreparedScene) -> PreparedScene:
     return replace(prepared, needs=needs, arrays=alone)
 
 
-def cut_out(radiance: NDArray[np.float32], matte: Matte) -> NDArray[np.uint8]:
+def cut_out(radiance: NDArray[np.float32], matte: Matte, tone: str = "srgb") -> NDArray[np.uint8]:
     """The pixels of a transparent picture, (h, w, 4): sRGB that is not multiplied by alpha, and alpha.
 
     Linear colours over the background, by alpha in 255ths, are ``radiance`` again. Alpha is rounded up, so that each
-    colour lies between that of the surface and of the background, and is one that sRGB has if both are.
+    colour lies between that of the surface and of the background, and is one that sRGB has if both are. A tone curve
+    is that of the surface alone.
     """
     alpha, misses = matte.alpha, matte.samples - matte.hits
     share = (alpha / 255.0)[..., None]
-    behind = matte.background * (matte.samples / np.maximum(misses, 1))[..., None]
+    behind = matte.background * (matte.samples / np.where(misses > 0.0, misses, 1.0))[..., None]
     seen = alpha > 0
     colors = (radiance - (1.0 - share) * behind)[seen] / share[seen]
     pixels = np.zeros((*alpha.shape, 4), np.uint8)
-    pixels[seen] = np.column_stack([srgb(colors), alpha[seen]])
+    pixels[seen] = np.column_stack([srgb(toned(colors, tone)), alpha[seen]])
     return pixels
 
 
-def save_cut_out(path: str | os.PathLike[str], radiance: NDArray[np.float32], matte: Matte) -> None:
+def save_cut_out(path: str | os.PathLike[str], radiance: NDArray[np.float32], matte: Matte, tone: str = "srgb") -> None:
     """Write a transparent picture as a PNG file, whole or not at all."""
-    write_atomically(path, lambda file: write_pixels(file, cut_out(radiance, matte)))
+    write_atomically(path, lambda file: write_pixels(file, cut_out(radiance, matte, tone)))

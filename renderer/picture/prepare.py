@@ -136,7 +136,7 @@ class PreparedScene:
         first_row, end_row = (0, height) if band is None else band
         first_column, end_column = (0, width) if columns is None else columns
         view = camera, (width, height), chosen.samples
-        rays_of, side = rays_of_tiles(*view), tile_side(*view)
+        rays_of, side = rays_of_tiles(*view, chosen.filter), tile_side(*view)
         settings = kernel_settings_of(self.needs, chosen, offset, media)
         arrays = arrays_for(self, camera, chosen, offset, media)
         wide, tall = end_column - first_column, end_row - first_row

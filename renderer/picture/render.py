@@ -70,7 +70,7 @@ def render(
     progress : bool, default False
         Whether to show a progress bar on standard error, if that is a terminal.
     **settings
-        Settings in place of those of the scene: ``resolution``, ``samples``, ``max_depth``, ``min_weight``,
+        Settings in place of those of the scene: ``resolution``, ``samples``, ``filter``, ``max_depth``, ``min_weight``,
         ``max_rays`` and ``shadows``; see ``RenderSettings``.
 
     Returns

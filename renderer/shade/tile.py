@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import load, minimum, offset, pointer, store
+from renderer.numerics.simd import load, maximum, minimum, offset, pointer, store
 from renderer.numerics.vec3 import add, normalized, put3, row3, scale, three
 from renderer.shade.bundle import SIDE, SIZE, append, clear, count_of
 from renderer.shade.direct import INSIDE, NORMAL, SURFACE_DOUBLES
@@ -31,6 +31,8 @@ from renderer.trace.traverse import Scratch, new_scratch, scratch_pointers
 from renderer.trace.trees import tree_pointers
 
 _BRIGHTEST = float(np.finfo(np.float32).max)
+# The most that a sample adds, which no number of them adds up to infinity.
+_FINITE = 2.0**1000
 # The side in pixels of the squares whose rays become packets.
 _SQUARE = 4
 
@@ -61,13 +63,15 @@ class CameraRays(NamedTuple):
 
     rays    the rows (6, 3) of the camera's affine map; or a row (n, 6) for each ray, its origin and unit direction:
             pixel by pixel of the tile for one place after the other; NaN where there is no ray
-    places  positions in the pixel (p, 2): those of the samples, and then the centre if none of them is there
+    places  positions from the pixel's corner (p, 2): those of the samples, and then the centre if none of them is there
+    weights those of the samples (count,), of mean 1
     count   the number of samples
     centre  the number of the place whose first hits are kept: one at the pixel's centre
     """
 
     rays: NDArray[np.float64]
     places: NDArray[np.float64]
+    weights: NDArray[np.float64]
     count: int  # type: ignore[assignment]  # tuples have a method of that name
     centre: int
 
@@ -78,6 +82,7 @@ class CameraMap(NamedTuple):
     rays: Any
     listed: Any
     places: Any
+    weights: Any
     count: Any
     centre: Any
     tile: Any
@@ -161,12 +166,15 @@ def _shows_first_hits(film):
 
 
 @kernel
-def _end_sample(film, block, scratch, total):
-    """Add the colours and ray counts of a sample to the sums of its block."""
+def _end_sample(film, block, scratch, total, weight):
+    """Add the colours of a sample, by its weight, and its ray counts to the sums of its block."""
     for y in range(block.y0, block.y1):
         for x in range(block.x0, block.x1):
             pixel = (y - block.y0) * SIDE + x - block.x0
-            put3(total, 3 * pixel, add(row3(total, pixel), row3(scratch.color, pixel)))
+            color = row3(scratch.color, pixel)
+            # Infinities of either sign would be no number together.
+            color = minimum(color[0], _FINITE), minimum(color[1], _FINITE), minimum(color[2], _FINITE)
+            put3(total, 3 * pixel, add(row3(total, pixel), scale(color, weight)))
             if len(film.rays) > 0:
                 film.rays[y, x] += load(scratch.traced, pixel)
 
@@ -181,7 +189,7 @@ def _end_block(film, block, scratch, total, count):
             cut += load(scratch.cut, pixel)
             # The largest float32 stands for anything brighter, as from a light within 1e-15 of a surface.
             for k in range(3):
-                film.radiance[y, x, k] = minimum(load(total, 3 * pixel + k) / count, _BRIGHTEST)
+                film.radiance[y, x, k] = maximum(minimum(load(total, 3 * pixel + k) / count, _BRIGHTEST), -_BRIGHTEST)
     return cut
 
 
@@ -212,7 +220,7 @@ def _next_sample(tree, scene, settings, camera, film, tile, scratch, total, stat
     """
     block, begun = _block_of(tile, load(state, _BLOCK)), load(state, _BEGUN)
     if begun > 0:
-        _end_sample(film, block, scratch, total)
+        _end_sample(film, block, scratch, total, load(camera.weights, begun - 1))
     if begun == camera.count:
         store(state, CUT, load(state, CUT) + _end_block(film, block, scratch, total, camera.count))
         store(state, _BLOCK, load(state, _BLOCK) + 1)
@@ -274,16 +282,17 @@ def _trace_next(tree, scene, settings, camera, film, tile, scratch, state):
 def render_tile(descriptor, scene, settings, camera, film, tile, arrays):
     """Fill the pixels of a ``Rectangle``, the tile, by its ``CameraRays``.
 
-    ``descriptor`` is the tree's. Depth, face and normal are those of the pixel's centre, radiance is the mean of the
-    samples, and rays are summed. Returns whether the tile is done. If not, ``arrays.bundles`` bundles were traced and
-    the caller can react to Ctrl-C; the next call with the same ``arrays``, a ``TileScratch``, continues.
+    ``descriptor`` is the tree's. Depth, face and normal are those of the pixel's centre, radiance is the weighted mean
+    of the samples, and rays are summed. Returns whether the tile is done. If not, ``arrays.bundles`` bundles were
+    traced and the caller can react to Ctrl-C; the next call with the same ``arrays``, a ``TileScratch``, continues.
     """
     doubles, integers, hits = pointer(arrays.doubles), pointer(arrays.integers), pointer(arrays.hits)
     state, total = pointer(arrays.state), pointer(arrays.total)
     scratch = bundle_scratch(doubles, integers, hits, settings, scratch_pointers(arrays.trace))
     tree, seen = tree_pointers(descriptor), scene_pointers(scene)
     listed = camera.rays.shape[1] == 6
-    shooting = CameraMap(pointer(camera.rays), listed, pointer(camera.places), camera.count, camera.centre, tile)
+    places, weights = pointer(camera.places), pointer(camera.weights)
+    shooting = CameraMap(pointer(camera.rays), listed, places, weights, camera.count, camera.centre, tile)
     if load(state, _BLOCK) == 0 and load(state, _BEGUN) == 0:
         begin_bundles(scratch, settings)
     for _ in range(arrays.bundles):

@@ -9,31 +9,27 @@ from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import Executor
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import expect
+from renderer.picture.animation import write_animation
 from renderer.picture.encoding import encoded
 from renderer.picture.exr import check_exr
 from renderer.picture.image import PLANES, exr_of
 from renderer.picture.matte import cut_out, matte_of
-from renderer.scene.vectors import unit
+from renderer.scene.vectors import rotated, unit
 from renderer.viewer.passes import Pass, colored, passes_of, picture, traced_by
 from renderer.viewer.protocol import FILE, CameraMessage, Rows, Still, Turntable, packed
 from renderer.viewer.shown import ShownScene
 from renderer.viewer.viewpoint import camera_of
 
-if TYPE_CHECKING:  # not needed before a file is made
-    from PIL.Image import Image as Pillow
-
 # Bytes of a message: pieces so small let pictures pass between them, and a client that stops reading takes one of them.
 _PIECE = 1 << 20
 # Seconds between messages of progress, as of pictures.
 _PROGRESS = 0.1
-# Milliseconds of a whole turn, and the least of a frame: browsers show GIF frames of less than 20 for 100.
-_TURN, _SHORTEST = 4000, 20
 
 
 class StoppedError(Exception):
@@ -53,17 +49,13 @@ def still(shown: ShownScene, asked: Still, finished: Callable[[float], object]) 
 
 
 def turntable(shown: ShownScene, asked: Turntable, finished: Callable[[float], object]) -> bytes:
-    """The animated file, which repeats for ever: WebP without loss, or GIF of 256 colours a frame.
+    """The animated file; see ``write_animation``.
 
     The first frame is the view's own, each next one turned by an equal angle. Of AOVs on a scale, each frame has one of
     its own. ``finished`` as of ``still``.
     """
-    frames = _frames(shown, asked, finished)
-    duration = max(_SHORTEST, round(_TURN / asked.frames / 10) * 10)  # GIF counts in hundredths of a second
-    buffer, first = io.BytesIO(), next(frames)
-    lossless = {"lossless": True} if asked.format == "webp" else {}
-    rest: Any = [_Sequence(frames, asked.frames - 1)]
-    first.save(buffer, asked.format, save_all=True, append_images=rest, duration=duration, loop=0, **lossless)
+    buffer = io.BytesIO()
+    write_animation(buffer, _frames(shown, asked, finished), asked.frames, asked.format)
     return buffer.getvalue()
 
 
@@ -75,9 +67,7 @@ def work(asked: Still | Turntable) -> int:
 
 def turned(m: list[float], pivot: NDArray[np.float64], axis: NDArray[np.float64], angle: float) -> list[float]:
     """The camera's matrix ``m`` (16) turned by ``angle`` (radians) about the line through ``pivot`` along the unit
-    vector ``axis``, anticlockwise as seen against it.
-
-    By Rodrigues' formula. An angle of 0 gives ``m`` to the bit.
+    vector ``axis``, anticlockwise as seen against it. An angle of 0 gives ``m`` to the bit.
     """
     if angle == 0.0:
         return m
@@ -85,8 +75,7 @@ def turned(m: list[float], pivot: NDArray[np.float64], axis: NDArray[np.float64]
     vectors = columns[:, :3]
     with np.errstate(over="ignore", invalid="ignore"):  # the camera refuses what is not finite
         vectors[3] -= pivot
-        along = (vectors @ axis)[:, None] * axis
-        vectors[:] = along + (vectors - along) * math.cos(angle) + np.cross(axis, vectors) * math.sin(angle)
+        vectors[:] = rotated(vectors, axis, angle)
         vectors[3] += pivot
     return [float(value) for value in columns.ravel()]
 
@@ -179,32 +168,11 @@ def _heard(ended: "asyncio.Future[Any]") -> None:
         ended.exception()
 
 
-class _Sequence:
-    """Frames as one image of several, for Pillow, each made when it is sought: WebP takes all images first, which were
-    four bytes a pixel.
-    """
-
-    def __init__(self, frames: "Iterator[Pillow]", number: int) -> None:
-        self.n_frames = number
-        self._frames = frames
-        self._frame: Pillow | None = None
-
-    def seek(self, _: int) -> None:
-        """Take the next frame, in whose order they are sought."""
-        self._frame = next(self._frames)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._frame, name)
-
-
-def _frames(shown: ShownScene, asked: Turntable, finished: Callable[[float], object]) -> "Iterator[Pillow]":
-    from PIL import Image as Pillow
-
+def _frames(shown: ShownScene, asked: Turntable, finished: Callable[[float], object]) -> Iterator[NDArray[np.uint8]]:
     pivot, axis = np.array(asked.pivot, np.float64), unit(asked.axis)
     for step in range(asked.frames):
         m = turned(asked.m, pivot, axis, 2.0 * math.pi * step / asked.frames)
-        frame = Pillow.fromarray(_pixels(shown, _view(asked, m), finished))
-        yield frame.quantize() if asked.format == "gif" else frame
+        yield _pixels(shown, _view(asked, m), finished)
 
 
 def _view(asked: Still | Turntable, m: list[float]) -> CameraMessage:

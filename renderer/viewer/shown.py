@@ -278,6 +278,7 @@ def render_settings(
     return RenderSettings(
         resolution=size,
         samples=samples,
+        filter=scene.render.filter,
         max_depth=0 if seen_directly else settings.max_depth,
         min_weight=scene.render.min_weight,
         max_rays=scene.render.max_rays if last else min(SOON, scene.render.max_rays),

@@ -157,7 +157,7 @@ def test_frames_go_on_where_the_parts_of_one_that_is_done_were_left(
         ({"camera": 3}, "camera: expected a camera"),
         ({"band": 0}, "band: expected an integer >= 1"),
         ({"folder": 3}, "folder: expected a string or path"),
-        ({"colour": 1}, "render: expected one of glass_shadows, .*got 'colour'"),
+        ({"colour": 1}, "render: expected one of filter, .*got 'colour'"),
         ({"planes": "depth"}, "planes: expected some of"),
         ({"offset": "x"}, "offset: expected 'bounded', 'mitsuba'"),
         ({"accelerator": "x"}, "accelerator: expected 'auto', 'octree' or 'brute'"),

@@ -30,6 +30,7 @@ PICTURES: dict[str, tuple[str, Any]] = {
     "--resolution": ("7x5", {"resolution": (7, 5)}),
     "--max-depth": ("1", {"max_depth": 1}),
     "--samples": ("9", {"samples": 9}),
+    "--filter": ("tent", {"filter": "tent"}),
     "--min-weight": ("0.25", {"min_weight": 0.25}),
     "--max-rays": ("5", {"max_rays": 5}),
     "--accelerator": ("brute", {"accelerator": "brute"}),
@@ -45,8 +46,8 @@ HERE = {
     "view": {"scene", "--up", "--write-scene", "--host", "--port", "--no-browser"},
     "compile": {"--queries", "--pictures", "--all", "--level", "--output", "--quiet"},
 }
-# tests/scene/test_every_change.py, tests/scene/test_up.py, tests/picture/test_matte.py
-ELSEWHERE = {"render": {"--change", "--up", "--exposure", "--transparent"}}
+# tests/scene/test_every_change.py, tests/scene/test_up.py, tests/picture/test_matte.py, test_tone.py, test_turntable.py
+ELSEWHERE = {"render": {"--change", "--up", "--exposure", "--transparent", "--tone", "--frames"}}
 
 
 def commands() -> dict[str, argparse.ArgumentParser]:

@@ -288,6 +288,7 @@ def check_transform(folder: Path, given: Values, index: int) -> str:
 RIGHT: dict[str, list[Any]] = {
     "resolution": [(1, 1), (2, 3), (8, 8), (33, 1), (1, 33), (40, 33), [33, 40], np.array([5, 40]), (3, 128)],
     "samples": [1, 1, 1, 4, 9, np.int64(4)],
+    "filter": ["box", "tent", "gaussian", "mitchell"],
     "max_depth": [0, 1, 2, 3, 6, 63, 64, np.int8(64)],
     "min_weight": [0.0, -0.0, 5e-324, 1e-300, 1e-12, 0.01, 0.5, math.nextafter(1.0, 0.0), 0, np.float32(0.01)],
     "max_rays": [1, 2, 3, 5, 16, 50, 50, 200, np.int32(7)],
@@ -297,6 +298,7 @@ _INTEGERS = [0, -1, -(2**63), 2**62, 2**63, 2**64, 10**400, 1.5, 4.0, math.nan, 
 BAD: dict[str, list[Any]] = {
     "resolution": [(0, 1), (1, -1), (16385, 1), (8,), (8, 8, 8), 8, (8.0, 8), "8x8", (2**63, 1), (math.nan, 8), {8, 9}],
     "samples": [2, 3, 65537, 65536**2, *_INTEGERS],
+    "filter": ["Box", "", "lanczos", 1, True],
     "max_depth": [65, 2**31, *_INTEGERS[1:]],
     "min_weight": [1.0, -5e-324, -1.0, 2.0, 1e308, *NOT_FINITE],
     "max_rays": _INTEGERS,

@@ -69,7 +69,7 @@ pytestmark = [pytest.mark.filterwarnings("ignore::renderer.SceneWarning"), pytes
     "scene.materials.phong.opacity_map", "scene.materials.phong.normal_map",
     "scene.materials.phong.vertex_colors", "scene.objects", "scene.objects.material",
     "scene.objects.mesh", "scene.objects.normals", "scene.objects.rotate", "scene.objects.scale",
-    "scene.objects.translate", "scene.render", "scene.render.max_depth", "scene.render.max_rays",
+    "scene.objects.translate", "scene.render", "scene.render.filter", "scene.render.max_depth", "scene.render.max_rays",
     "scene.render.min_weight", "scene.render.resolution", "scene.render.samples", "scene.render.shadows",
     "scene.render.glass_shadows", "scene.render.terminator",
     "scene.sky", "scene.sky.ground", "scene.sky.horizon", "scene.sky.lights", "scene.sky.sun", "scene.sky.sun_angle",
@@ -246,6 +246,7 @@ FIELDS: dict[type, dict[str, Field]] = {
             [0, 8.0, True, (0, 1), (1, 16385), (8.5, 1), (True, 1), (1, 2, 3)]
         ),
         "samples": Field(1, same(1, 4, 9, 256**2), [0, -1, 2, 3, 257**2, 1.0, True, "4", None]),
+        "filter": Field("box", same("box", "tent", "gaussian", "mitchell"), ["Box", "lanczos", "", None, True]),
         "max_depth": Field(6, same(0, 64), [-1, 65, 1.0, True, "3", None]),
         "min_weight": number(0.0, 0.0, math.nextafter(1, 0), refused=(-TINY, 1.0, BEYOND)),
         "max_rays": Field(16384, same(1, 2**62 - 1), [0, -1, 2**62, 1.5, True, "3", None]),

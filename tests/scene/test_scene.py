@@ -44,6 +44,7 @@ background = [0.1, 0.2, 0.3]
 [render]
 resolution = [8, 6]
 samples = 4
+filter = "tent"
 max_depth = 3
 min_weight = 0.001
 max_rays = 99
@@ -134,7 +135,14 @@ def error_of(folder: Path, text: str) -> str:
 def test_a_file_that_uses_every_key(folder: Path) -> None:
     scene = load(folder, FULL)
     assert scene.ambient == (0.1, 0.1, 0.1) and scene.background == (0.1, 0.2, 0.3)
-    settings = {"resolution": (8, 6), "samples": 4, "max_depth": 3, "min_weight": 0.001, "max_rays": 99}
+    settings = {
+        "resolution": (8, 6),
+        "samples": 4,
+        "filter": "tent",
+        "max_depth": 3,
+        "min_weight": 0.001,
+        "max_rays": 99,
+    }
     settings |= {"shadows": False, "glass_shadows": "clear", "terminator": "soft"}
     assert scene.render.model_dump() == settings
     assert scene.camera == PerspectiveCamera(eye=(0, 1, 5), target=(0, 0, 0), fov=40)

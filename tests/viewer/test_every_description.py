@@ -15,7 +15,7 @@ from renderer.viewer.shown import UNSEEN, open_file
 # Scenes with a camera of the page.
 SHOWN = [v for v in VARIATIONS if v.table["camera"]["type"] in ("perspective", "orthographic")]
 # What the server alone goes by.
-UNTOLD = ("min_weight", "max_rays", "glass_shadows", "terminator", *UNSEEN)
+UNTOLD = ("filter", "min_weight", "max_rays", "glass_shadows", "terminator", *UNSEEN)
 
 
 def fetched(folder: Path, table: Any) -> tuple[str, bytes]:

@@ -31,6 +31,7 @@ from validation.promises.pictures.images import check_images
 from validation.promises.pictures.nesting import check_nesting
 from validation.promises.pictures.openings import check_openings
 from validation.promises.pictures.placing import check_placing
+from validation.promises.pictures.reconstruction import check_filters
 from validation.promises.pictures.refraction import check_refraction
 from validation.promises.pictures.saved import check_saved
 from validation.promises.pictures.shining import check_shining
@@ -152,6 +153,7 @@ PICTURES = {
     "floors and samples": Check(
         check_floors, ("Floor", "scene.floor.materials", "scene.floor.squares", "scene.render.samples")
     ),
+    "filters": Check(check_filters, ("scene.render.filter",)),
     "bounces": Check(check_bounces, ("scene.render.max_depth", "scene.render.min_weight", "prepare")),
     "lights": Check(check_shining, ("DirectionalLight", "PointLight", "scene.render.glass_shadows")),
     "skies": Check(
@@ -162,7 +164,7 @@ PICTURES = {
     "files of pictures": Check(check_saved, ("Image.save",)),
     "nested media": Check(check_nesting, ("Dielectric",)),
     "refraction": Check(lambda: check_refraction(_random(), _REFRACTED), ("Dielectric",)),
-    "codes": Check(check_codes, ("srgb",)),
+    "codes": Check(check_codes, ("srgb", "Image.toned")),
     "boxes shown": Check(lambda: check_openings(_random(), _OPENED), ()),
 }
 SCENES = {

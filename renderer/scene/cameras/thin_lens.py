@@ -105,7 +105,8 @@ class ThinLensCamera(PerspectiveCamera):
 
 def lens_places(x: Floats, y: Floats, number: int) -> tuple[Floats, Floats]:
     """Places in the unit square for a sample of the pixels at film positions ``x`` and ``y``."""
-    mixed = _mixed(np.floor(x).astype(np.uint64) << np.uint64(32) | np.floor(y).astype(np.uint64))
+    column, row = (np.floor(place).astype(np.int64).astype(np.uint64) for place in (x, y))  # also beside the film
+    mixed = _mixed(column << np.uint64(32) | row)
     starts = mixed >> np.uint64(32), mixed & np.uint64(0xFFFFFFFF)
     u, v = ((start.astype(np.float64) / 2.0**32 + number * step) % 1.0 for start, step in zip(starts, _R2, strict=True))
     return u, v

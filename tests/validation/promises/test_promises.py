@@ -14,7 +14,7 @@ from renderer.octree import Octree
 from renderer.picture import camera_rays, image, pack, prepare
 from renderer.queryable import Queries
 from renderer.results import hits
-from renderer.scene import scene
+from renderer.scene import filters, scene
 from renderer.trace.layout import Tree
 from validation.promises.hits import (
     alone,
@@ -42,6 +42,7 @@ from validation.promises.pictures import (
     nesting,
     openings,
     placing,
+    reconstruction,
     refraction,
     saved,
     shining,
@@ -72,6 +73,7 @@ CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "placing": lambda: placing.check_placing(np.random.default_rng(5), 12),
     "floors": floors.check_floors,
     "bounces": bounces.check_bounces,
+    "filters": reconstruction.check_filters,
     "nesting": nesting.check_nesting,
     "shining": shining.check_shining,
     "images": lambda: images.check_images(np.random.default_rng(5)),
@@ -191,8 +193,16 @@ def test_scaling_in_another_order_is_found(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_samples_at_one_place_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(camera_rays, "sample_offsets", lambda samples: np.full((samples, 2), 0.5))
+    monkeypatch.setattr(filters, "sample_offsets", lambda samples: np.full((samples, 2), 0.5))
     assert broken("floors") == {"samples lie"}
+
+
+def test_a_filter_of_another_width_or_weight_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = camera_rays.film_samples
+    changes = [lambda p, w: (0.8 * (p - 0.5) + 0.5, w), lambda p, w: (p, np.ones_like(w))]
+    for change in changes:
+        monkeypatch.setattr(camera_rays, "film_samples", lambda *told, change=change: change(*sound(*told)))
+        assert broken("filters") == {"a pixel"}
 
 
 def test_a_light_that_is_left_out_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -241,6 +251,12 @@ def test_codes_a_step_off_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(codes, "srgb", lambda linear: sound(np.asarray(linear, np.float64) * (
         1.0 + 1e-7 * (getattr(linear, "dtype", None) == np.float32))))  # fmt: skip
     assert broken("codes") == {"float32 numbers"}
+
+
+def test_a_tone_curve_a_step_off_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = codes.toned
+    monkeypatch.setattr(codes, "toned", lambda radiance, tone: sound(radiance * np.float32(1.001), tone))
+    assert broken("codes") == {"tone curves"}
 
 
 def test_a_cosine_without_its_last_digits_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

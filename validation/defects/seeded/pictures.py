@@ -192,6 +192,10 @@ _CHANGES: dict[str, Change] = {
     "offset 1e-2": Wrapped("render._offset", _far_bounded),
     "sRGB applied twice": Wrapped("image._encoded", _encoded_twice),
     "sRGB cut off instead of rounded": Rule("rounded-encoding", without("+", 1)),
+    "Reinhard's curve by the brightest channel": Rule(
+        "tone-by-luminance", value("np.maximum(red, np.maximum(green, blue))")
+    ),
+    "the curve of ACES without its toe": Rule("aces-fit", value("_ + 0.1 * x / (1.0 + x)")),
     "radiance already in sRGB": _on_film(_encoded_radiance),
     "background 2 % darker": _packed(lambda arrays: arrays._replace(colors=arrays.colors * [[1.0], [0.98]])),
     "no ambient light": _packed(lambda arrays: arrays._replace(colors=arrays.colors * [[0.0], [1.0]])),
@@ -223,6 +227,8 @@ _CHANGES: dict[str, Change] = {
     "spawned rays start on their surface": Rule("spawn-offset", argument(1, "0.0 * _")),
     "the tint of glass lost": Rule("tint-of-glass", element(1, "(_[0], _[0], _[0])")),
     "all samples of a pixel at one place": after("sample_offsets", lambda places: np.full_like(places, 0.5)),
+    "filters as narrow as a pixel": after("film_samples", lambda found: (np.clip(found[0], 0.0, 1.0), found[1])),
+    "samples of all filters count the same": after("film_samples", lambda found: (found[0], np.ones_like(found[1]))),
     "objects turned about y and z before x": Wrapped("SceneObject.matrix", _turned_in_another_order),
     "objects scaled after they are turned": Wrapped("SceneObject.matrix", _scaled_when_turned),
     "the floor begins with its other colour": Rule("floor-colour", operand("%", 0, "_ + 1")),

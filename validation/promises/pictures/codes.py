@@ -1,11 +1,14 @@
-"""The 8-bit codes of sRGB: each begins at the least number that the standard's formula rounds to it."""
+"""The 8-bit codes of sRGB: each begins at the least number that the standard's formula rounds to it. Tone curves."""
 
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from renderer.picture.image import srgb
+from renderer.picture.tone import toned
 from validation.promises.row import row
 
 # Rounding of a power in float64, in units of the last place of the number: how far a code's start may be off.
@@ -27,7 +30,31 @@ def check_codes() -> list[dict[str, Any]]:
         row("sRGB codes begin where the standard's formula says", "integer arithmetic", wide),
         row("float32 numbers get the codes of the same float64", "known answer",
             srgb(single.astype(np.float32)) == expected),
+        row("tone curves are those of their authors", "rational arithmetic", _tones()),
     ]  # fmt: skip
+
+
+def _tones() -> NDArray[np.bool_]:
+    """Colours of all brightness, within the rounding of float32."""
+    channels = [Fraction(0), *(Fraction(2) ** power for power in range(-12, 15, 2))]
+    colors = [(a, b, c) for a in channels for b in channels for c in channels]
+    radiance = np.array(colors, np.float32)
+    kept = []
+    for tone, curve in (("reinhard", _reinhard), ("aces", _aces)):
+        expected = np.array([curve(color) for color in colors], np.float64)
+        kept.append(np.abs(toned(radiance, tone) - expected) <= 2.0**-24 * expected)
+    return np.concatenate(kept)
+
+
+def _reinhard(color: Sequence[Fraction]) -> list[Fraction]:
+    weights = Fraction("0.2126"), Fraction("0.7152"), Fraction("0.0722")
+    luminance = sum(weight * x for weight, x in zip(weights, color, strict=True))
+    return [x / (1 + luminance) for x in color]
+
+
+def _aces(color: Sequence[Fraction]) -> list[Fraction]:
+    a, b, c, d, e = map(Fraction, ("2.51", "0.03", "2.43", "0.59", "0.14"))
+    return [min(Fraction(1), x * (a * x + b) / (x * (c * x + d) + e)) for x in color]
 
 
 def _start(code: int) -> Fraction:

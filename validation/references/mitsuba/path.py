@@ -81,7 +81,8 @@ def path(
         raise ValueError(f"scene: expected only Phong surfaces and mirrors, got {fault}")
     bundles = mitsuba_scene.camera_rays(scene, width, height, samples) if rays is None else [rays]
     passes = _passes(scene, max_depth)
-    result = sum(_paths(passes, bundle, 1)[0] for bundle in bundles)
+    weights = mitsuba_scene.camera_weights(scene, bundles)
+    result = sum(weight * _paths(passes, bundle, 1)[0] for weight, bundle in zip(weights, bundles, strict=True))
     return (result / len(bundles)).reshape(height, width, 3)
 
 

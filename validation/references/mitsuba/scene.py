@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
-from renderer.scene.camera import primary_rays, sample_offsets
+from renderer.scene.camera import primary_rays
+from renderer.scene.filters import film_samples
 from renderer.scene.instance import Instance
 from renderer.scene.light import DirectionalLight, Light
 from renderer.scene.scene import Scene
@@ -38,7 +39,13 @@ VERTEX_ROUNDING = 2.0**-22
 
 def camera_rays(scene: Scene, width: int, height: int, samples: int) -> list[Rays]:
     """Our primary rays for each sample of a pixel: origins, unit directions, (height * width, 3) float64."""
-    return [primary_rays(scene.camera, width, height, (x, y)) for x, y in sample_offsets(samples).tolist()]
+    places, _ = film_samples(scene.render.filter, samples)
+    return [primary_rays(scene.camera, width, height, (x, y)) for x, y in places.tolist()]
+
+
+def camera_weights(scene: Scene, bundles: list[Rays]) -> list[float]:
+    """The weights of the samples of ``camera_rays``, of mean 1."""
+    return film_samples(scene.render.filter, len(bundles))[1].tolist()
 
 
 def mitsuba_rays(rays: Rays) -> list[mi.Ray3f]:

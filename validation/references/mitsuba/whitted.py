@@ -201,12 +201,13 @@ def whitted(
     """
     tracer, _ = recursion_of(scene, max_depth)
     bundles = mitsuba_scene.camera_rays(scene, width, height, samples) if rays is None else [rays]
+    weights = mitsuba_scene.camera_weights(scene, bundles)
     result = np.zeros((height, width, 3))
     for number, bundle in enumerate(bundles):
         traced = mitsuba_scene.mitsuba_rays(bundle)
         for row in range(height):
             line = [tracer.radiance(ray, 0) for ray in traced[row * width : (row + 1) * width]]
-            result[row] += np.array(line, dtype=np.float64).reshape(width, 3)
+            result[row] += weights[number] * np.array(line, dtype=np.float64).reshape(width, 3)
             if progress is not None:
                 progress(number * height + row + 1, len(bundles) * height)
     return result / len(bundles)
