@@ -20,6 +20,7 @@ _CHANGE = (
     "'render.shadows = false', or leave objects out, such as 'hide = [\"objects.0\", \"floor\"]'; may be given again"
 )
 _EXPOSURE = "make the picture 2^STOPS times as bright; default: 0"
+_WINDOW = "render only this part: the columns from LEFT to below RIGHT and the rows from TOP to below BOTTOM"
 _TRANSPARENT = "for a .png: leave the background out, with alpha in its place"
 _ACCELERATOR = "default: auto, the octree unless there are very few faces; brute tests all faces"
 
@@ -33,6 +34,7 @@ def add_render(commands: Any) -> None:
     render.add_argument(
         "--resolution", type=resolution, metavar="WxH", help="pixels, such as 640x360; one number is both"
     )
+    render.add_argument("--window", type=int, nargs=4, metavar=("LEFT", "TOP", "RIGHT", "BOTTOM"), help=_WINDOW)
     render.add_argument("--max-depth", type=int, metavar="N", help="bounces, 0 to 64")
     render.add_argument("--samples", type=int, metavar="N", help="samples per pixel: 1, 4, 9, ...")
     render.add_argument("--min-weight", type=float, metavar="W", help="end rays whose weight is less")
@@ -75,7 +77,7 @@ def _render(options: argparse.Namespace) -> None:
     from renderer.picture.image import PLANES, check_picture_path
 
     check_picture_path(options.output)
-    _check_transparent(options)
+    _check_fits(options)
     scene = _scene(options)
     names = ("resolution", "samples", "max_depth", "min_weight", "max_rays", "accelerator", "split")
     asked: dict[str, Any] = {name: getattr(options, name) for name in names}
@@ -113,11 +115,13 @@ def _scene(options: argparse.Namespace) -> Any:
     return scene
 
 
-def _check_transparent(options: argparse.Namespace) -> None:
-    """Refuse a transparent picture where none is made."""
-    if options.transparent:
-        expect(options.output.suffix.lower() == ".png", "--transparent", "a .png file", repr(str(options.output)))
-        expect(options.cluster is None, "--transparent", "a picture of this machine", "--cluster")
+def _check_fits(options: argparse.Namespace) -> None:
+    """Refuse a transparent picture or a window where none is made."""
+    png = options.output.suffix.lower() == ".png"
+    expect(png or not options.transparent, "--transparent", "a .png file", repr(str(options.output)))
+    for name in ("transparent", "window"):
+        alone = options.cluster is None or not getattr(options, name)
+        expect(alone, f"--{name}", "a picture of this machine", "--cluster")
 
 
 def _rendered_here(scene: Any, asked: dict[str, Any], options: argparse.Namespace) -> tuple[Any, Any]:
@@ -131,7 +135,7 @@ def _rendered_here(scene: Any, asked: dict[str, Any], options: argparse.Namespac
     source, asked = scene, {**asked, "threads": options.threads}
     if options.transparent:
         source = prepare(scene, **{name: asked.pop(name) for name in ("accelerator", "split")}, threads=options.threads)
-    image = render(source, **asked, progress=not options.quiet)
+    image = render(source, **asked, window=options.window, progress=not options.quiet)
     return image, _matte(source, options) if options.transparent else None
 
 
@@ -144,7 +148,9 @@ def _matte(ready: Any, options: argparse.Namespace) -> Any:
     scene = ready.scene
     given = {name: getattr(options, name) for name in ("resolution", "samples")}
     chosen = checked_settings(scene.render, given, scene.camera)
-    return matte_of(ready, scene.camera, chosen, checked_threads(options.threads))
+    left, top, right, bottom = options.window or (0, 0, *chosen.resolution)
+    threads, rows, columns = checked_threads(options.threads), (top, bottom), (left, right)
+    return matte_of(ready, scene.camera, chosen, threads, band=rows, columns=columns)
 
 
 def _exposed(image: Any, options: argparse.Namespace) -> Any:
