@@ -52,31 +52,30 @@ class Distortion(NamedTuple):
     def straight(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
         """The places within ``reach`` that move to (x, y), by damped Newton's method; NaN where there are none."""
         aims, reach = np.stack([np.ravel(x), np.ravel(y)]), self.reach()
-        places, shares, errors = np.zeros_like(aims), np.ones(aims.shape[1]), np.hypot(*aims)
-        left = np.flatnonzero(errors)
+        places, missed, shares = np.zeros_like(aims), aims.copy(), np.ones(aims.shape[1])
+        left = np.flatnonzero(aims.any(axis=0))
         with np.errstate(all="ignore"):  # a step may lead too far, and is halved
             for _ in range(_STEPS):
-                here, aim = places[:, left], aims[:, left]
-                tried = here + shares[left] * self._step(here, aim)
-                error = np.hypot(*(aim - self.bent(*tried)))
-                better = (error < errors[left]) & (np.hypot(*tried) <= reach)
-                places[:, left[better]], errors[left[better]] = tried[:, better], error[better]
+                here, before = places[:, left], missed[:, left]
+                tried = here + shares[left] * self._step(here, before)
+                after = aims[:, left] - self.bent(*tried)
+                better = (np.hypot(*after) < np.hypot(*before)) & (np.hypot(*tried) <= reach)
+                places[:, left[better]], missed[:, left[better]] = tried[:, better], after[:, better]
                 shares[left] = np.where(better, np.minimum(1.0, 2.0 * shares[left]), 0.5 * shares[left])
-                left = left[(tried != here).any(axis=0) & (errors[left] > 0.0)]
+                left = left[(tried != here).any(axis=0) & missed[:, left].any(axis=0)]
                 if not len(left):
                     break
-            solved = errors <= _SOLVED * (np.hypot(*aims) + np.hypot(*places))
+            solved = np.hypot(*missed) <= _SOLVED * (np.hypot(*aims) + np.hypot(*places))
         x_of, y_of = np.where(solved, places, np.nan)
         return x_of.reshape(np.shape(x)), y_of.reshape(np.shape(y))
 
-    def _step(self, places: Floats, aims: Floats) -> Floats:
-        """Newton's step from places towards those that move to ``aims``."""
-        x, y = places
+    def _step(self, places: Floats, missed: Floats) -> Floats:
+        """Newton's step from places that move to points which miss their aims by so much."""
+        (x, y), (off_x, off_y) = places, missed
         square = x * x + y * y
         scale = polynomial((1.0, self.k1, self.k2, self.k3), square) + 2.0 * (self.p1 * y + self.p2 * x)
         slope = 2.0 * polynomial((self.k1, 2.0 * self.k2, 3.0 * self.k3), square)
         xx = scale + slope * x * x + 4.0 * self.p2 * x
         yy = scale + slope * y * y + 4.0 * self.p1 * y
         xy = slope * x * y + 2.0 * (self.p1 * x + self.p2 * y)
-        off_x, off_y = aims - self.bent(x, y)
         return np.stack([yy * off_x - xy * off_y, xx * off_y - xy * off_x]) / (xx * yy - xy * xy)
