@@ -59,8 +59,7 @@ class OpenCVCamera(CalibratedCamera, AngularCamera):
     Examples
     --------
     >>> from renderer import OpenCVCamera
-    >>> film = {"width": 640, "height": 480, "fx": 500, "fy": 500}
-    >>> camera = OpenCVCamera(**film, k1=-0.2, eye=(0, 0, 5), target=(0, 0, 0))
+    >>> camera = OpenCVCamera(width=640, height=480, fx=500, fy=500, k1=-0.2, eye=(0, 0, 5), target=(0, 0, 0))
     >>> camera.project([[0, 0, 0], [2.5, 0, 0]])[0].tolist()
     [[320.0, 240.0], [557.5, 240.0]]
     >>> camera.rays((557.5, 240))[1].round(6).tolist()
