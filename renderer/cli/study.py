@@ -36,8 +36,9 @@ _USUAL = 960, 720
 
 
 class Layout(NamedTuple):
-    """Width and height of a picture in pixels, and the rows of the legend below it."""
+    """The camera of a picture, if one is given, its width and height in pixels, and the rows of the legend below."""
 
+    camera: Any
     size: tuple[int, int]
     legend_rows: int
 
@@ -100,8 +101,7 @@ def _study(options: argparse.Namespace) -> None:
     paths = kept_of(options.mesh, options.hide)
     up = _up(paths, options)
     made = _options_of(options, up)
-    camera = _camera(options)
-    layout = _layout(options, camera)
+    layout = _layout(options)
     files = load_files(paths)
     octree = Octree.from_mesh(files.mesh, split=SPLIT, threads=options.threads)
     chosen = _chosen(octree, options, up)
@@ -112,7 +112,7 @@ def _study(options: argparse.Namespace) -> None:
         if output.suffix.lower() == ".npy" and chosen.of_faces is None and chosen.of_vertices is None:
             parts.join(output)
         else:
-            _write(output, options, octree.mesh, chosen, parts.joined(), camera, layout, up)
+            _write(output, options, octree.mesh, chosen, parts.joined(), layout, up)
     if not options.quiet:
         _say_result(options, files, chosen, parts, seconds)
     # Last, so that no work is lost if a file cannot be written.
@@ -195,28 +195,21 @@ def _options_of(options: argparse.Namespace, up: str) -> dict[str, Any]:
     return of | {name: value for name in _OWN[options.kind] if (value := getattr(options, name)) is not None}
 
 
-def _camera(options: argparse.Namespace) -> Any:
-    from renderer.scene.scene import load_scene
-
-    if options.camera is None:
-        return None
-    return load_scene(options.camera).camera
-
-
-def _layout(options: argparse.Namespace, camera: Any) -> Layout:
+def _layout(options: argparse.Namespace) -> Layout:
     """The layout of a picture. Refuses one that cannot be drawn before the work begins."""
     from renderer.diagnostics.mesh_values import FINER, legend_rows, map_size
-    from renderer.scene.scene import MOST_PIXELS
+    from renderer.scene.scene import MOST_PIXELS, load_scene
 
+    camera = None if options.camera is None else load_scene(options.camera).camera
     film = None if camera is None else camera.film_size
     width, height = options.resolution or film or _USUAL
     widest = MOST_PIXELS // FINER
     right = min(width, height) >= 1 and max(width, height) <= widest
     expect(right, "--resolution", f"1x1 to {widest}x{widest}", f"{width}x{height}")
     if film is None:
-        return Layout(map_size((width, height)), legend_rows(height))
+        return Layout(camera, map_size((width, height)), legend_rows(height))
     camera.rays((0, 0), (width, height))  # refuses another shape than the film's
-    return Layout((width, height), legend_rows(height))
+    return Layout(camera, (width, height), legend_rows(height))
 
 
 def _chosen(octree: Any, options: argparse.Namespace, up: Any) -> Any:
@@ -234,14 +227,7 @@ def _chosen(octree: Any, options: argparse.Namespace, up: Any) -> Any:
 
 
 def _write(
-    output: Path,
-    options: argparse.Namespace,
-    mesh: Any,
-    chosen: Any,
-    answers: Any,
-    camera: Any,
-    layout: Layout,
-    up: str,
+    output: Path, options: argparse.Namespace, mesh: Any, chosen: Any, answers: Any, layout: Layout, up: str
 ) -> None:
     """Write the results of points that need a place: those of a mesh, and those in a .ply."""
     from renderer.arguments.up import UP_AXES
@@ -259,12 +245,12 @@ def _write(
         drawing.write_ply(output, mesh.vertices, mesh.faces, values, of_faces)
     else:
         seen = values if of_faces else values[mesh.faces].mean(axis=1)
-        image = _picture(mesh, camera, layout.size, options, up)
+        image = _picture(mesh, layout, options, up)
         picture = drawing.draw(image, mesh, seen, _KINDS[options.kind], layout.legend_rows, UP_AXES[up])
         drawing.write_png(output, picture)
 
 
-def _picture(mesh: Any, camera: Any, size: tuple[int, int], options: argparse.Namespace, up: str) -> Any:
+def _picture(mesh: Any, layout: Layout, options: argparse.Namespace, up: str) -> Any:
     """The faces and normals that a camera sees; by default it looks down from the south-west."""
     from renderer.diagnostics.mesh_values import FINER
     from renderer.picture.render import render
@@ -273,8 +259,8 @@ def _picture(mesh: Any, camera: Any, size: tuple[int, int], options: argparse.Na
     from renderer.scene.scene import Scene, SceneObject
 
     thing = SceneObject(mesh=mesh, material="grey", normals="flat")
-    width, height = size
-    eye = from_above(mesh, size, up) if camera is None else camera
+    width, height = layout.size
+    eye = from_above(mesh, layout.size, up) if layout.camera is None else layout.camera
     scene = Scene(camera=eye, materials={"grey": Phong()}, objects=[thing], ambient=1)
     return render(scene, resolution=(FINER * width, FINER * height), samples=1, max_depth=0, planes=("face", "normal"),
                   threads=options.threads, progress=not options.quiet)  # fmt: skip

@@ -175,7 +175,7 @@ def scan(
     beams = _beams(surfaces, origin, pattern, check_reach(max_distance, distance))
     closest = _closest(surfaces, mask, ignore)
     stands = len(beams.origins) == 1 and not is_camera(origin) and mask == MASK_BITS and ignore is None
-    expected = "None where the scanner moves, is a camera, or has a mask or ignore"
+    expected = "None where the scanner moves or has a mask or ignore, or is a camera"
     expect(stands or normal is None, "normal", expected, repr(normal))
     side = None if normal is None else _one_direction("normal", normal)
     returns = count_argument("returns", returns, 1)
