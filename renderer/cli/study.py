@@ -206,7 +206,7 @@ def _layout(options: argparse.Namespace) -> Layout:
     widest = MOST_PIXELS // FINER
     right = min(width, height) >= 1 and max(width, height) <= widest
     expect(right, "--resolution", f"1x1 to {widest}x{widest}", f"{width}x{height}")
-    if film is None:
+    if camera is None or film is None:
         return Layout(camera, map_size((width, height)), legend_rows(height))
     camera.rays((0, 0), (width, height))  # refuses another shape than the film's
     return Layout(camera, (width, height), legend_rows(height))
