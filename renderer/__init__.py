@@ -22,7 +22,7 @@ The public names::
         load_scene           a scene from a .toml file, or around a mesh file
         Scene                camera, materials, lights, objects; faults raise SceneError, slips warn with SceneWarning
         PerspectiveCamera, OrthographicCamera, ThinLensCamera
-        PinholeCamera, OpenCVFisheyeCamera   calibrated cameras, as of OpenCV, COLMAP and nerfstudio
+        PinholeCamera, OpenCVCamera, OpenCVFisheyeCamera   calibrated, as of OpenCV, COLMAP and nerfstudio
         FisheyeCamera, EquirectangularCamera
         Phong, Mirror, Dielectric
         DirectionalLight, PointLight

@@ -30,6 +30,7 @@ from .results.hits import Hits as Hits
 from .results.steps import Steps as Steps
 from .scene.cameras.equirectangular import EquirectangularCamera as EquirectangularCamera
 from .scene.cameras.fisheye import FisheyeCamera as FisheyeCamera
+from .scene.cameras.opencv import OpenCVCamera as OpenCVCamera
 from .scene.cameras.opencv_fisheye import OpenCVFisheyeCamera as OpenCVFisheyeCamera
 from .scene.cameras.orthographic import OrthographicCamera as OrthographicCamera
 from .scene.cameras.perspective import PerspectiveCamera as PerspectiveCamera

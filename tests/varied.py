@@ -20,6 +20,7 @@ from renderer import (
     FisheyeCamera,
     Image,
     Mesh,
+    OpenCVCamera,
     OpenCVFisheyeCamera,
     OrthographicCamera,
     PerspectiveCamera,
@@ -50,6 +51,7 @@ ORTHOGRAPHIC = {"type": "orthographic", **_CAMERA, "height": 3.5}
 _FILM: Table = {"width": 20, "height": 16, "fx": 22.0, "fy": 20.0, "cx": 9.0, "cy": 8.5, "skew": 1.0}
 PINHOLE = {"type": "pinhole", **_CAMERA, **_FILM}
 FISHEYE = {"type": "fisheye", **_CAMERA, "fov": 70.0}
+OPENCV = {"type": "opencv", **_CAMERA, **_FILM, "k1": 0.1, "k2": 0.02, "p1": 0.02, "p2": 0.03, "k3": 0.01}
 OPENCV_FISHEYE = {"type": "opencv_fisheye", **_CAMERA, **_FILM, "k1": 0.1, "k2": 0.02, "k3": 0.03, "k4": 0.01}
 EQUIRECTANGULAR = {"type": "equirectangular", **_CAMERA}
 THIN_LENS = {"type": "thin_lens", **_CAMERA, "fov": 40.0, "aperture": 0.3, "focus": 4.0}
@@ -95,6 +97,8 @@ OTHERS: dict[type[Fields], Table] = {
                          "up": [-0.2, 1.0, 0.1], "height": 2.5},
     PinholeCamera: {"type": PERSPECTIVE, **_PLACE, **_OTHER_FILM},
     FisheyeCamera: {"type": PERSPECTIVE, **_PLACE, "fov": 90.0},
+    OpenCVCamera: {"type": PERSPECTIVE, **_PLACE, **_OTHER_FILM, "k1": -0.3, "k2": 0.3, "p1": 0.2, "p2": -0.2,
+                   "k3": 0.3},
     OpenCVFisheyeCamera: {"type": PERSPECTIVE, **_PLACE, **_OTHER_FILM, "k1": -0.3, "k2": 0.3, "k3": -0.3, "k4": 0.3},
     EquirectangularCamera: {"type": PERSPECTIVE, **_PLACE},
     ThinLensCamera: {"type": PERSPECTIVE, **_PLACE, "fov": 50.0, "aperture": 0.8, "focus": 1.5},
@@ -207,7 +211,7 @@ _UNDER_SKY = {name: value for name, value in BASE.items() if name != "background
 # All of a scene, those of its camera where that is of another type, and those of a sky.
 VARIATIONS = list(_variations(BASE))
 VARIATIONS += [other for other in _variations(_UNDER_SKY) if other.keys[0] == "sky"]
-for _kind in (ORTHOGRAPHIC, PINHOLE, FISHEYE, OPENCV_FISHEYE, EQUIRECTANGULAR, THIN_LENS):
+for _kind in (ORTHOGRAPHIC, PINHOLE, FISHEYE, OPENCV, OPENCV_FISHEYE, EQUIRECTANGULAR, THIN_LENS):
     VARIATIONS += [other for other in _variations(BASE | {"camera": _kind}) if other.keys[0] == "camera"]
 
 

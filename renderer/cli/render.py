@@ -22,6 +22,7 @@ _CHANGE = (
 _FILTERS = ("box", "tent", "gaussian", "mitchell")
 _EXPOSURE = "make the picture 2^STOPS times as bright; default: 0"
 _TONE = "the tone curve of a .png or an animation; default: srgb, which clips what is brighter than white"
+_WINDOW = "render only this part: the columns from LEFT to below RIGHT and the rows from TOP to below BOTTOM"
 _TRANSPARENT = "for a .png: leave the background out, with alpha in its place"
 _ACCELERATOR = "default: auto, the octree unless there are very few faces; brute tests all faces"
 
@@ -35,6 +36,7 @@ def add_render(commands: Any) -> None:
     render.add_argument(
         "--resolution", type=resolution, metavar="WxH", help="pixels, such as 640x360; one number is both"
     )
+    render.add_argument("--window", type=int, nargs=4, metavar=("LEFT", "TOP", "RIGHT", "BOTTOM"), help=_WINDOW)
     render.add_argument("--max-depth", type=int, metavar="N", help="bounces, 0 to 64")
     render.add_argument("--samples", type=int, metavar="N", help="samples per pixel: 1, 4, 9, ...")
     render.add_argument("--filter", choices=_FILTERS, help="how samples become pixels (default: box)")
@@ -80,7 +82,7 @@ def _render(options: argparse.Namespace) -> None:
     from renderer.picture.animation import check_animation_path
     from renderer.picture.image import PLANES, check_picture_path
 
-    _check_encoding(options)
+    _check_fits(options)
     (check_picture_path if options.frames is None else check_animation_path)(options.output)
     scene = _scene(options)
     names = ("resolution", "samples", "filter", "max_depth", "min_weight", "max_rays", "accelerator", "split")
@@ -122,17 +124,17 @@ def _scene(options: argparse.Namespace) -> Any:
     return scene
 
 
-def _check_encoding(options: argparse.Namespace) -> None:
-    """Refuse a transparent picture where none is made, and a tone curve where radiance stays linear."""
+def _check_fits(options: argparse.Namespace) -> None:
+    """Refuse what the kind of output has not: transparency, a window, a tone curve where radiance stays linear."""
     suffix = options.output.suffix.lower()
-    here = options.frames is None or options.cluster is None
-    expect(here, "--frames", "a turntable of this machine", "--cluster")
     linear = options.tone != "srgb" and suffix in (".exr", ".npy")
     expect(not linear, "--tone", "a .png file or an animation", repr(str(options.output)))
-    if options.transparent:
-        expect(suffix == ".png", "--transparent", "a .png file", repr(str(options.output)))
-        expect(options.frames is None, "--transparent", "a picture", "--frames")
-        expect(options.cluster is None, "--transparent", "a picture of this machine", "--cluster")
+    expect(suffix == ".png" or not options.transparent, "--transparent", "a .png file", repr(str(options.output)))
+    for name in ("transparent", "window"):
+        expect(not getattr(options, name) or options.frames is None, f"--{name}", "a picture", "--frames")
+    for name in ("transparent", "window", "frames"):
+        alone = options.cluster is None or not getattr(options, name)
+        expect(alone, f"--{name}", "a picture of this machine", "--cluster")
 
 
 def _rendered_here(scene: Any, asked: dict[str, Any], options: argparse.Namespace) -> tuple[Any, Any]:
@@ -146,7 +148,7 @@ def _rendered_here(scene: Any, asked: dict[str, Any], options: argparse.Namespac
     source, asked = scene, {**asked, "threads": options.threads}
     if options.transparent:
         source = prepare(scene, **{name: asked.pop(name) for name in ("accelerator", "split")}, threads=options.threads)
-    image = render(source, **asked, progress=not options.quiet)
+    image = render(source, **asked, window=options.window, progress=not options.quiet)
     return image, _matte(source, options) if options.transparent else None
 
 
@@ -159,7 +161,9 @@ def _matte(ready: Any, options: argparse.Namespace) -> Any:
     scene = ready.scene
     given = {name: getattr(options, name) for name in ("resolution", "samples")}
     chosen = checked_settings(scene.render, given, scene.camera)
-    return matte_of(ready, scene.camera, chosen, checked_threads(options.threads))
+    left, top, right, bottom = options.window or (0, 0, *chosen.resolution)
+    threads, rows, columns = checked_threads(options.threads), (top, bottom), (left, right)
+    return matte_of(ready, scene.camera, chosen, threads, band=rows, columns=columns)
 
 
 def _developed(image: Any, options: argparse.Namespace) -> Any:

@@ -2,7 +2,7 @@
 
 import argparse
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from renderer.cli.cluster import add_cluster, on_cluster
 from renderer.cli.meshes import Files, kept_of, load_files, say_up, up_of, values_of_files
@@ -28,7 +28,19 @@ _HEIGHT = "with --grid: do not drop the points; all have this height"
 _BOUNDS = "with --grid: the least and greatest corner of the region; default: that of the mesh"
 _POINTS = "points of an .npy, .csv, .xyz or .ply file, (n, 3), or (n, 6) with normals, which otherwise point up"
 _DISTANCE = "how far from a point a hit still counts; default: any distance"
-_RESOLUTION = "size of a .png with its legend; default: 960x720"
+_RESOLUTION = (
+    "size of a .png with its legend; default: 960x720. Of a calibrated camera: without it; default: its film's"
+)
+# The size of a picture with its legend.
+_USUAL = 960, 720
+
+
+class Layout(NamedTuple):
+    """The camera of a picture, if one is given, its width and height in pixels, and the rows of the legend below."""
+
+    camera: Any
+    size: tuple[int, int]
+    legend_rows: int
 
 
 def add_study(commands: Any) -> None:
@@ -57,7 +69,7 @@ def add_study(commands: Any) -> None:
     # The former name of --max-distance.
     study.add_argument("--distance", dest="max_distance", type=float, default=argparse.SUPPRESS, help=argparse.SUPPRESS)
     study.add_argument("--camera", type=Path, metavar="SCENE", help="for a .png: a scene file with the camera")
-    study.add_argument("--resolution", type=resolution, default=(960, 720), metavar="WxH", help=_RESOLUTION)
+    study.add_argument("--resolution", type=resolution, metavar="WxH", help=_RESOLUTION)
     add_cluster(study)
     study.add_argument("--threads", type=int, metavar="N", help="default: all processors")
     study.add_argument("--quiet", action="store_true", help="show no progress, summary or notice")
@@ -89,7 +101,7 @@ def _study(options: argparse.Namespace) -> None:
     paths = kept_of(options.mesh, options.hide)
     up = _up(paths, options)
     made = _options_of(options, up)
-    camera = _camera(options)
+    layout = _layout(options)
     files = load_files(paths)
     octree = Octree.from_mesh(files.mesh, split=SPLIT, threads=options.threads)
     chosen = _chosen(octree, options, up)
@@ -100,7 +112,7 @@ def _study(options: argparse.Namespace) -> None:
         if output.suffix.lower() == ".npy" and chosen.of_faces is None and chosen.of_vertices is None:
             parts.join(output)
         else:
-            _write(output, options, octree.mesh, chosen, parts.joined(), camera, up)
+            _write(output, options, octree.mesh, chosen, parts.joined(), layout, up)
     if not options.quiet:
         _say_result(options, files, chosen, parts, seconds)
     # Last, so that no work is lost if a file cannot be written.
@@ -161,9 +173,6 @@ def _check_output(options: argparse.Namespace) -> None:
 
 def _check_options(options: argparse.Namespace) -> None:
     """Refuse other options that do not fit together before the work begins."""
-    from renderer.diagnostics.mesh_values import FINER
-    from renderer.scene.scene import MOST_PIXELS
-
     for kind, names in _OWN.items():
         for name in names:
             given = options.kind != kind and getattr(options, name) is not None
@@ -171,9 +180,6 @@ def _check_options(options: argparse.Namespace) -> None:
     expect(options.kind != "sun" or options.suns is not None, "--suns", "a file for the kind sun", "none")
     for name in ("height", "bounds"):
         expect(options.grid is not None or getattr(options, name) is None, f"--{name}", "none without --grid", "one")
-    widest = MOST_PIXELS // FINER
-    right = min(options.resolution) >= 1 and max(options.resolution) <= widest
-    expect(right, "--resolution", f"1x1 to {widest}x{widest}", "{}x{}".format(*options.resolution))
 
 
 def _options_of(options: argparse.Namespace, up: str) -> dict[str, Any]:
@@ -189,15 +195,21 @@ def _options_of(options: argparse.Namespace, up: str) -> dict[str, Any]:
     return of | {name: value for name in _OWN[options.kind] if (value := getattr(options, name)) is not None}
 
 
-def _camera(options: argparse.Namespace) -> Any:
-    from renderer.scene.scene import load_scene
+def _layout(options: argparse.Namespace) -> Layout:
+    """The layout of a picture. Refuses one that cannot be drawn before the work begins."""
+    from renderer.diagnostics.mesh_values import FINER, legend_rows, map_size
+    from renderer.scene.scene import MOST_PIXELS, load_scene
 
-    if options.camera is None:
-        return None
-    camera = load_scene(options.camera).camera
-    # The legend takes some rows of the picture.
-    expect(camera.film_size is None, "--camera", "a camera whose film may have any shape", f"one of type {camera.type}")
-    return camera
+    camera = None if options.camera is None else load_scene(options.camera).camera
+    film = None if camera is None else camera.film_size
+    width, height = options.resolution or film or _USUAL
+    widest = MOST_PIXELS // FINER
+    right = min(width, height) >= 1 and max(width, height) <= widest
+    expect(right, "--resolution", f"1x1 to {widest}x{widest}", f"{width}x{height}")
+    if camera is None or film is None:
+        return Layout(camera, map_size((width, height)), legend_rows(height))
+    camera.rays((0, 0), (width, height))  # refuses another shape than the film's
+    return Layout(camera, (width, height), legend_rows(height))
 
 
 def _chosen(octree: Any, options: argparse.Namespace, up: Any) -> Any:
@@ -215,7 +227,7 @@ def _chosen(octree: Any, options: argparse.Namespace, up: Any) -> Any:
 
 
 def _write(
-    output: Path, options: argparse.Namespace, mesh: Any, chosen: Any, answers: Any, camera: Any, up: str
+    output: Path, options: argparse.Namespace, mesh: Any, chosen: Any, answers: Any, layout: Layout, up: str
 ) -> None:
     """Write the results of points that need a place: those of a mesh, and those in a .ply."""
     from renderer.arguments.up import UP_AXES
@@ -233,22 +245,22 @@ def _write(
         drawing.write_ply(output, mesh.vertices, mesh.faces, values, of_faces)
     else:
         seen = values if of_faces else values[mesh.faces].mean(axis=1)
-        image, rows = _picture(mesh, camera, options, up), drawing.legend_rows(options.resolution[1])
-        picture = drawing.draw(image, mesh, seen, _KINDS[options.kind], rows, UP_AXES[up])
+        image = _picture(mesh, layout, options, up)
+        picture = drawing.draw(image, mesh, seen, _KINDS[options.kind], layout.legend_rows, UP_AXES[up])
         drawing.write_png(output, picture)
 
 
-def _picture(mesh: Any, camera: Any, options: argparse.Namespace, up: str) -> Any:
+def _picture(mesh: Any, layout: Layout, options: argparse.Namespace, up: str) -> Any:
     """The faces and normals that a camera sees; by default it looks down from the south-west."""
-    from renderer.diagnostics.mesh_values import FINER, map_size
+    from renderer.diagnostics.mesh_values import FINER
     from renderer.materials.phong import Phong
     from renderer.picture.render import render
     from renderer.scene.overview import from_above
     from renderer.scene.scene import Scene, SceneObject
 
     thing = SceneObject(mesh=mesh, material="grey", normals="flat")
-    width, height = map_size(options.resolution)
-    eye = from_above(mesh, (width, height), up) if camera is None else camera
+    width, height = layout.size
+    eye = from_above(mesh, layout.size, up) if layout.camera is None else layout.camera
     scene = Scene(camera=eye, materials={"grey": Phong()}, objects=[thing], ambient=1)
     return render(scene, resolution=(FINER * width, FINER * height), samples=1, max_depth=0, planes=("face", "normal"),
                   threads=options.threads, progress=not options.quiet)  # fmt: skip

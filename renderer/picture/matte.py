@@ -52,6 +52,7 @@ def matte_of(
     threads: int,
     finished: Callable[[int], object] | None = None,
     band: tuple[int, int] | None = None,
+    columns: tuple[int, int] | None = None,
 ) -> Matte:
     """The matte of the picture with these arguments; see ``PreparedScene.picture``.
 
@@ -64,7 +65,7 @@ def matte_of(
     def seen(ambient: float, background: NDArray[np.float64], sky: NDArray[np.float64]) -> NDArray[np.float32]:
         arrays = shapes.arrays._replace(colors=np.array([[ambient] * 3, background]), sky=sky)
         shown = replace(shapes, arrays=arrays)
-        return shown.picture(camera, direct, BOUNDED, threads, finished, (), band).radiance
+        return shown.picture(camera, direct, BOUNDED, threads, finished, (), band, columns=columns).radiance
 
     share = seen(1.0, np.zeros(3), sky[:0])[..., 0].astype(np.float64)
     hits = np.clip(chosen.samples * share, 0.0, chosen.samples)

@@ -107,12 +107,12 @@ def render(
     expect(isinstance(scene, Scene | PreparedScene), "scene", "a Scene or a PreparedScene", type(scene).__name__)
     source = scene.scene if isinstance(scene, PreparedScene) else scene
     view = checked_view(source, camera, offset, planes, settings, media)
+    columns, rows = _window(window, *view.chosen.resolution)
     if isinstance(scene, PreparedScene):
         _expect_usual(accelerator, split, needs)
         prepared = scene
     else:
         prepared = _prepared(scene, view.chosen.max_depth, accelerator, split, needs, threads)
-    columns, rows = _window(window, *view.chosen.resolution)
     side = tile_side(view.camera, view.chosen.resolution, view.chosen.samples)
     with progress_bar(tiles(columns[1] - columns[0], rows[1] - rows[0], side), "tile", progress) as update:
         image = prepared.picture(

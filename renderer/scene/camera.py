@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from renderer.scene.cameras.base import BaseCamera
 from renderer.scene.cameras.equirectangular import EquirectangularCamera
 from renderer.scene.cameras.fisheye import FisheyeCamera
+from renderer.scene.cameras.opencv import OpenCVCamera
 from renderer.scene.cameras.opencv_fisheye import OpenCVFisheyeCamera
 from renderer.scene.cameras.orthographic import OrthographicCamera
 from renderer.scene.cameras.perspective import PerspectiveCamera
@@ -18,6 +19,7 @@ __all__ = [
     "Camera",
     "EquirectangularCamera",
     "FisheyeCamera",
+    "OpenCVCamera",
     "OpenCVFisheyeCamera",
     "OrthographicCamera",
     "PerspectiveCamera",
@@ -31,6 +33,7 @@ Camera = (
     PerspectiveCamera
     | OrthographicCamera
     | PinholeCamera
+    | OpenCVCamera
     | FisheyeCamera
     | OpenCVFisheyeCamera
     | EquirectangularCamera

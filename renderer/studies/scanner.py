@@ -21,6 +21,7 @@ from renderer.rayscene.hits import SceneHits
 from renderer.rayscene.scene import RayScene
 from renderer.results.hits import Hits
 from renderer.studies.directions import Pattern, check_count, fibonacci_sphere
+from renderer.studies.film import AffineCamera, Camera, is_camera, rays_of
 from renderer.studies.share import ROWS as _ROWS
 from renderer.studies.share import Snapshot, check_directions, check_reach, lengths_of, limits_of, snapshot_of
 from renderer.studies.stand import hits_from_stand
@@ -29,6 +30,8 @@ from renderer.trace.layout import MASK_BITS
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+
+_RAYS = 100_000  # by default
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +87,8 @@ class Scan:
 
 def scan(
     octree: Queries | RayScene,
-    origin: ArrayLike,
-    pattern: Pattern | ArrayLike | int = 100_000,
+    origin: ArrayLike | Camera | AffineCamera,
+    pattern: Pattern | ArrayLike | int | None = None,
     *,
     normal: ArrayLike | None = None,
     max_distance: float = np.inf,
@@ -101,12 +104,14 @@ def scan(
     Parameters
     ----------
     octree : Octree, BruteForce or RayScene
-    origin : array_like, shape (3,), (k, 3), (3, 4), (4, 4), (k, 3, 4) or (k, 4, 4)
+    origin : array_like, shape (3,), (k, 3), (3, 4), (4, 4), (k, 3, 4) or (k, 4, 4); or a camera
         Where the scanner stands. A matrix is its pose: it also turns the directions. For a scanner that moves while
-        it scans, give one place or pose for each ray.
+        it scans, give one place or pose for each ray. A camera, as of `depth_map`, has a ray through the centre of each
+        pixel that shows something.
     pattern : Pattern, array_like of shape (k, 3), or int, default 100_000
         The directions of the rays, of any length; or their number, 1 to 2^24, for `fibonacci_sphere`. A single one is
-        that of all rays.
+        that of all rays. For a camera: width and height of its film, from 1 to 2^16 pixels, by default those that it is
+        calibrated for.
     normal : array_like, shape (3,), optional
         For a scanner on the surface, at one place: it stands on this side. By default it stands on the outer side of
         its face, from which the corners run counter-clockwise.
@@ -137,8 +142,8 @@ def scan(
 
     Notes
     -----
-    Where a scanner that moves, or one with `mask` or `ignore`, touches the surface, its rays hit that at once, as
-    those of ``closest_hit`` do.
+    Where a camera, a scanner that moves, or one with `mask` or `ignore`, touches the surface, its rays hit that at
+    once, as those of ``closest_hit`` do.
 
     Examples
     --------
@@ -158,18 +163,26 @@ def scan(
     >>> cloud = scan(scene, pose, [[1, 0, 0]], returns=3, through=pane)
     >>> cloud.objects, cloud.distances, cloud.returns
     (array([0, 0, 1]), array([2. , 2.5, 4. ]), array([1, 2, 3]))
+
+    By a depth camera, whose ray in row y and column x has the number y * width + x.
+
+    >>> from renderer import PerspectiveCamera
+    >>> camera = PerspectiveCamera(eye=(0.5, 0.25, 3), target=(0.5, 0.25, 0))
+    >>> scan(Octree.from_mesh(box()), camera, (3, 1)).rays
+    array([1])
     """
     surfaces = snapshot_of(octree)
     beams = _beams(surfaces, origin, pattern, check_reach(max_distance, distance))
     closest = _closest(surfaces, mask, ignore)
-    stands = len(beams.origins) == 1 and mask == MASK_BITS and ignore is None
-    expect(stands or normal is None, "normal", "None where the scanner moves or has a mask or ignore", repr(normal))
+    stands = len(beams.origins) == 1 and not is_camera(origin) and mask == MASK_BITS and ignore is None
+    expected = "None where the scanner moves or has a mask or ignore, or is a camera"
+    expect(stands or normal is None, "normal", expected, repr(normal))
     side = None if normal is None else _one_direction("normal", normal)
     returns = count_argument("returns", returns, 1)
     clear = _clear_objects(surfaces, through, returns)
     parts: list[Scan] = []
     with progress_bar(len(beams.rays), "ray", flag_argument("progress", progress)) as update:
-        for begin in range(0, len(beams.rays), _ROWS):
+        for begin in range(0, max(len(beams.rays), 1), _ROWS):
             some = beams.part(slice(begin, begin + _ROWS))
             if stands:
                 hits = hits_from_stand(surfaces, some.origins[0], some.directions, some.reach, side)
@@ -195,8 +208,15 @@ class _Beams(NamedTuple):
         return _Beams(origins, self.directions[rows], self.reach[rows], self.rays[rows])
 
 
-def _beams(surfaces: Queries | Snapshot, origin: ArrayLike, pattern: Pattern | ArrayLike | int, reach: float) -> _Beams:
+def _beams(
+    surfaces: Queries | Snapshot,
+    origin: ArrayLike | Camera | AffineCamera,
+    pattern: Pattern | ArrayLike | int | None,
+    reach: float,
+) -> _Beams:
     """The rays of a scanner. Raises ``ValueError`` naming argument and row."""
+    if is_camera(origin):
+        return _beams_of_film(origin, pattern, reach)
     directions, given = _directions(pattern), real_argument("origin", origin)
     posed = given.shape[-2:] in ((3, 4), (4, 4))
     if posed:
@@ -215,6 +235,19 @@ def _beams(surfaces: Queries | Snapshot, origin: ArrayLike, pattern: Pattern | A
     elif len(directions) < count:
         directions = np.tile(directions, (count, 1))
     return _Beams(places, directions, limits_of(reach, directions), np.arange(count))
+
+
+def _beams_of_film(camera: Any, pattern: object, reach: float) -> _Beams:
+    """The rays of a camera, without those of pixels that show nothing."""
+    given = getattr(camera, "film_size", None) if pattern is None else pattern
+    sizes = np.asarray(getattr(given, "directions", given))
+    whole = sizes.shape == (2,) and sizes.dtype.kind in "iu" and bool(((sizes >= 1) & (sizes <= 1 << 16)).all())
+    expect(whole, "pattern", "width and height of the camera's film, from 1 to 65536", repr(pattern))
+    width, height = sizes.tolist()
+    origins, directions = rays_of(camera, width, height)(*np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5))
+    origins, directions = np.broadcast_to(origins, directions.shape).reshape(-1, 3), directions.reshape(-1, 3)
+    shown = np.flatnonzero(~np.isnan(directions[:, 0]))
+    return _Beams(origins[shown], directions[shown], np.full(len(shown), reach), shown)
 
 
 def _closest(surfaces: Queries | Snapshot, mask: int, ignore: SceneHits | None) -> Callable[..., Hits | SceneHits]:
@@ -288,7 +321,9 @@ def _one_direction(argument: str, direction: ArrayLike) -> Floats:
     return check_directions(argument, np.reshape(direction, (1, 3)))[0]
 
 
-def _directions(pattern: Pattern | ArrayLike | int) -> Floats:
+def _directions(pattern: Pattern | ArrayLike | int | None) -> Floats:
+    if pattern is None:
+        return fibonacci_sphere(_RAYS).directions
     if isinstance(pattern, Pattern):
         return check_directions("pattern", pattern.directions)
     if isinstance(pattern, Integral):  # of NumPy, too

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import Any, Literal, Protocol
+from collections.abc import Iterator
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.arguments.arrays import flag_argument, real_array
+from renderer.arguments.arrays import flag_argument
 from renderer.arguments.counts import count_argument
 from renderer.arguments.points import check_points, farthest_of
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.mesh.mesh import face_normals
-from renderer.numerics.film_rays import affine_map, along, unit_rows
+from renderer.numerics.film_rays import along
 from renderer.queryable import Queries
 from renderer.rayscene.scene import RayScene
 from renderer.results.hits import points_on
 from renderer.studies.edge_on import are_edge_on
+from renderer.studies.film import AffineCamera, Camera, axis_of, rays_of
 from renderer.studies.share import ROWS as _ROWS
 from renderer.studies.share import Snapshot, octree_of, snapshot_of
 from renderer.system.terminal import progress_bar
@@ -27,23 +28,6 @@ Floats = NDArray[np.float64]
 
 # The most parts of a face's sides.
 _MOST_CUTS = 64
-
-
-class AffineCamera(Protocol):
-    """A camera whose rays are affine in the film position."""
-
-    def rows(self, width: int, height: int) -> Floats:
-        """The affine map from film to rays (6, 3): origin, its steps along x and y, direction, and its steps."""
-
-
-class Camera(Protocol):
-    """A camera with rays of its own, such as a ``FisheyeCamera``."""
-
-    def rays(self, pixels: ArrayLike, resolution: tuple[int, int]) -> tuple[Floats, Floats]:
-        """Origins and unit directions (..., 3) through film positions (..., 2); NaN for those that show nothing."""
-
-    def frame(self) -> tuple[Floats, Floats, Floats]:
-        """The axes to the right, up and forward."""
 
 
 def visible_faces(
@@ -163,8 +147,8 @@ def depth_map(
     surfaces = snapshot_of(octree)
     width, height = count_argument("width", width, 1, 1 << 16), count_argument("height", height, 1, 1 << 16)
     expect(isinstance(depth, str) and depth in ("distance", "z"), "depth", "'distance' or 'z'", repr(depth))
-    rays_at, found = _rays_of(camera, width, height), np.empty((height, width))
-    axis = _axis_of(camera, width, height) if depth == "z" else None
+    rays_at, found = rays_of(camera, width, height), np.empty((height, width))
+    axis = axis_of(camera, width, height) if depth == "z" else None
     lines, x = max(1, _ROWS // width), np.arange(width) + 0.5
     with progress_bar(height, "line", flag_argument("progress", progress)) as update:
         for top in range(0, height, lines):
@@ -191,49 +175,6 @@ def _one_place(argument: str, place: ArrayLike, octree: Queries) -> Floats:
     rows, shape = check_points(argument, place, farthest_of(octree.tree.scale))
     expect(shape == (), argument, "shape (3,)", f"shape {(*shape, 3)}")
     return rows[0]
-
-
-def _rays_of(camera: Any, width: int, height: int) -> Callable[[Floats, Floats], tuple[Floats, Floats]]:
-    """The rays of a camera through film positions x and y."""
-    if callable(getattr(camera, "rows", None)):
-        rows = _rows_of(camera, width, height)
-        return lambda x, y: _affine(rows, x, y)
-    expect(callable(getattr(camera, "rays", None)), "camera", "a camera", type(camera).__name__)
-    return lambda x, y: camera.rays(np.stack([x, y], axis=-1), (width, height))
-
-
-def _affine(rows: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    origins, ways = affine_map(rows, x, y)
-    good = np.isfinite(ways).all(axis=-1) & ways.any(axis=-1)
-    if not good.all():
-        expect(False, "camera", "rows with finite, non-zero directions", f"{ways[~good][0].tolist()}")
-    return origins, unit_rows(ways)
-
-
-def _axis_of(camera: Any, width: int, height: int) -> Floats:
-    """The direction along which a camera's z grows: across its film."""
-    if callable(getattr(camera, "frame", None)):
-        axis: Floats = camera.frame()[2]
-        return axis
-    rows = _rows_of(camera, width, height)
-    return unit_rows(np.cross(rows[1] + rows[4], rows[2] + rows[5]))
-
-
-def _rows_of(camera: AffineCamera, width: int, height: int) -> Floats:
-    """A camera's affine map."""
-    expected = "rows(width, height) of shape (6, 3), finite"
-    try:
-        given = camera.rows(width, height)
-    except TypeError as error:  # of a class, or of one that takes other arguments
-        raise ValueError(f"camera: expected {expected}, got {error}") from error
-    try:
-        rows = real_array(given)
-    except ValueError as error:
-        raise ValueError(f"camera: expected {expected}, got {type(given).__name__}") from error
-    expect(rows.shape == (6, 3), "camera", expected, f"shape {rows.shape}")
-    bad = ~np.isfinite(rows).all(axis=1)
-    expect(not bad.any(), "camera", expected, f"{rows[int(bad.argmax())].tolist()} in row {int(bad.argmax())}")
-    return rows.astype(np.float64)
 
 
 def _centroids(cuts: int) -> Iterator[tuple[float, float]]:

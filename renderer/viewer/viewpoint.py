@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from renderer.arguments.fields import first_fault
 from renderer.errors import SceneError, expect
-from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera, PinholeCamera
+from renderer.scene.camera import Camera, OpenCVCamera, OrthographicCamera, PerspectiveCamera, PinholeCamera
 from renderer.viewer.protocol import Pixel
 
 # The kinds of cameras that the page has.
@@ -57,7 +57,7 @@ def page_camera(camera: Camera) -> PageCamera:
     fov = _USUAL_FOV
     if isinstance(camera, PerspectiveCamera):
         fov = camera.fov
-    if isinstance(camera, PinholeCamera):
+    if isinstance(camera, PinholeCamera | OpenCVCamera):
         fov = math.degrees(2.0 * math.atan(camera.height / camera.fy / 2.0))
     return PerspectiveCamera.model_validate({**camera.model_dump(include={"eye", "target", "up"}), "fov": fov})
 

@@ -8,12 +8,15 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from cases import cases
+from PIL import Image as Pillow
 
 import renderer
 from renderer.cli.compiling import choose_processor
 from renderer.cli.main import main
+from renderer.mesh.load import load_mesh
 from renderer.picture.render import render
 from renderer.precompile import compile_ahead
 from renderer.scene.scene import load_scene
@@ -193,14 +196,27 @@ def test_arguments_that_make_no_sense_are_usage_errors(
     assert caught.value.code == 2 and out == "" and "error: " in err.splitlines()[-1] and "Traceback" not in err
 
 
-@pytest.mark.judges("octree-render study --camera")
-def test_a_camera_with_a_film_of_its_own_draws_no_study(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Its picture has a legend below. Nothing is computed before."""
-    eye, film = "eye = [9, 9, 9]\ntarget = [0, 0, 0]", "width = 64\nheight = 48\nfx = 50\nfy = 50"
-    (tmp_path / "eye.toml").write_text(f'[camera]\ntype = "pinhole"\n{eye}\n{film}\n[materials]\n')
-    model, camera = ROOT / "scenes" / "models" / "block.ply", tmp_path / "eye.toml"
-    message = fails(capsys, "study", "sky", model, "--up", "z", "--camera", camera, "-o", tmp_path / "a.png", "--quiet")
-    assert "--camera: expected a camera whose film may have any shape, got one of type pinhole" in message
+@pytest.mark.judges("octree-render study --camera", "octree-render study --resolution")
+def test_a_calibrated_camera_draws_a_study_as_large_as_its_film(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With a legend below, and where its vertices are projected. Another shape is refused before the work begins."""
+    eye, film = "eye = [9, 9, 9]\ntarget = [0, 0, 0]", "width = 160\nheight = 120\nfx = 150\nfy = 150\nk1 = -0.2"
+    (tmp_path / "eye.toml").write_text(f'[camera]\ntype = "opencv"\n{eye}\n{film}\n[materials]\n')
+    model, scene, output = ROOT / "scenes" / "models" / "block.ply", tmp_path / "eye.toml", tmp_path / "a.png"
+    words = ["study", "sky", str(model), "--up", "z", "--camera", str(scene), "-o", str(output), "--quiet"]
+    pixels, _ = load_scene(scene).camera.project(load_mesh(model).vertices)
+    for more, scale in (([], 1), (["--resolution", "80x60"], 0.5)):
+        assert main([*words, *more]) == 0
+        with Pillow.open(output) as read:
+            drawn = np.asarray(read)
+        assert drawn.shape == (120 * scale + 28, 160 * scale, 3)
+        rows, columns = (drawn[: int(120 * scale)] != 255).any(axis=2).nonzero()
+        seen = [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
+        np.testing.assert_allclose(seen, [*scale * pixels.min(axis=0), *scale * pixels.max(axis=0)], atol=1.0)
+    output.unlink()
+    message = fails(capsys, *words, "--resolution", "80x80")
+    assert "resolution: expected 160 x 120" in message and not output.exists()
 
 
 def test_a_disk_that_fills_up_is_one_line(

@@ -41,7 +41,7 @@ PICTURES: dict[str, tuple[str, Any]] = {
 BITLESS = {"--accelerator", "--split", "--threads"}
 # The options that other tests give alone; those of ``study`` are in tests/checkpoints/test_every_option.py.
 HERE = {
-    "render": {*PICTURES, "scene", "--output", "--write-scene", "--quiet", "--cluster"},
+    "render": {*PICTURES, "scene", "--output", "--write-scene", "--quiet", "--cluster", "--window"},
     "info": {"scene", "--split"},
     "view": {"scene", "--up", "--write-scene", "--host", "--port", "--no-browser"},
     "compile": {"--queries", "--pictures", "--all", "--level", "--output", "--quiet"},
@@ -135,6 +135,37 @@ def test_a_picture_is_that_of_render_with_the_options_argument(
     found, expected = np.load(tmp_path / "a.npy"), picture(scene, **given).radiance
     assert found.tobytes() == expected.tobytes()
     assert (found.tobytes() != picture(scene).radiance.tobytes()) == (name not in BITLESS)
+
+
+@pytest.mark.judges("octree-render render --window")
+@pytest.mark.parametrize("transparent", [[], ["--transparent"]])
+def test_a_window_has_the_pixels_of_the_whole_picture(
+    folder: Path, tmp_path: Path, asked: list[dict[str, Any]], transparent: list[str]
+) -> None:
+    found = []
+    for words in ([], ["--window", "3", "2", "9", "7"]):
+        rendered(folder / "scene.toml", tmp_path / "a.png", *transparent, *words)
+        with Pillow.open(tmp_path / "a.png") as read:
+            found.append(np.asarray(read))
+    np.testing.assert_array_equal(found[1], found[0][2:7, 3:9])
+    assert [told["window"] for told in asked] == [None, [3, 2, 9, 7]]
+
+
+@cases(
+    ("words", "said"),
+    [
+        (["9", "2", "3", "7"], "window: expected left < right, top < bottom, four integers within 10 x 8 pixels"),
+        (["0", "0", "11", "8"], "within 10 x 8 pixels, got"),
+        (["-1", "0", "4", "8"], "within 10 x 8 pixels, got"),
+        (["3", "2", "9", "7", "--cluster"], "--window: expected a picture of this machine, got --cluster"),
+    ],
+)
+def test_a_window_that_is_none_is_refused(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], said: str
+) -> None:
+    output = tmp_path / "a.npy"
+    assert main(["render", str(folder / "scene.toml"), "-o", str(output), "--quiet", "--window", *words]) == 2
+    assert said in capsys.readouterr().err and not output.exists()
 
 
 @pytest.mark.judges("octree-render render --quiet")

@@ -18,6 +18,7 @@ from renderer.mesh.shapes import box
 from renderer.scene.camera import (
     EquirectangularCamera,
     FisheyeCamera,
+    OpenCVCamera,
     OpenCVFisheyeCamera,
     OrthographicCamera,
     PerspectiveCamera,
@@ -59,6 +60,7 @@ KINDS: dict[str, tuple[type, Place, dict[str, Any]]] = {
     "[camera], orthographic": (OrthographicCamera, ("camera",), {"type": "orthographic", "height": 4.0, **EYE}),
     "[camera], thin lens": (ThinLensCamera, ("camera",), {"type": "thin_lens", "aperture": 0.1, **EYE}),
     "[camera], pinhole": (PinholeCamera, ("camera",), {"type": "pinhole", **FILM, **EYE}),
+    "[camera], OpenCV": (OpenCVCamera, ("camera",), {"type": "opencv", **FILM, **EYE}),
     "[camera], OpenCV fish-eye": (OpenCVFisheyeCamera, ("camera",), {"type": "opencv_fisheye", **FILM, **EYE}),
     "[camera], fish-eye": (FisheyeCamera, ("camera",), {"type": "fisheye", **EYE}),
     "[camera], equirectangular": (EquirectangularCamera, ("camera",), {"type": "equirectangular", **EYE}),

@@ -23,6 +23,7 @@ from renderer import (
     FisheyeCamera,
     Image,
     Mirror,
+    OpenCVCamera,
     OpenCVFisheyeCamera,
     OrthographicCamera,
     PerspectiveCamera,
@@ -52,13 +53,14 @@ MATERIALS = {
 }
 CAMERAS: dict[str, Any] = {
     "perspective": PerspectiveCamera, "orthographic": OrthographicCamera, "pinhole": PinholeCamera,
-    "fisheye": FisheyeCamera, "opencv_fisheye": OpenCVFisheyeCamera, "equirectangular": EquirectangularCamera,
-    "thin_lens": ThinLensCamera,
+    "fisheye": FisheyeCamera, "opencv": OpenCVCamera, "opencv_fisheye": OpenCVFisheyeCamera,
+    "equirectangular": EquirectangularCamera, "thin_lens": ThinLensCamera,
 }  # fmt: skip
 # Their numbers beside their place, with usual values; "size" stands for that of the scene.
 LENSES: dict[str, dict[str, list[Any]]] = {
     "perspective": {"fov": [1.0, 40.0, 179.0]}, "orthographic": {"height": ["size"]}, "equirectangular": {},
     "pinhole": {"fx": [8.0], "fy": [9.0], "cx": [4.0, -20.0]}, "fisheye": {"fov": [20.0, 180.0, 360.0]},
+    "opencv": {"fx": [8.0], "fy": [9.0], "k1": [0.0, 0.1, -0.5], "p1": [0.0, 0.1], "k3": [0.0, 0.02]},
     "opencv_fisheye": {"fx": [3.0], "fy": [4.0], "k1": [0.0, 0.1, -0.5], "k3": [0.0, 0.02]},
     "thin_lens": {"fov": [40.0], "aperture": [0.0, "size"], "focus": ["size"]},
 }  # fmt: skip

@@ -11,6 +11,7 @@ from cases import cases
 from renderer import (
     EquirectangularCamera,
     FisheyeCamera,
+    Mesh,
     OpenCVFisheyeCamera,
     PerspectiveCamera,
     Phong,
@@ -198,3 +199,25 @@ def test_many_samples_take_smaller_tiles_and_give_the_same_picture() -> None:
     origins, directions = lens_rays(289, (3, 4, 22, 21))
     hit = prepare(scene_of(LENS)).octree.closest_hit(origins[:289], directions[:289]).hit
     np.testing.assert_allclose(image.radiance[..., 0], 0.8 * hit.mean(axis=0), rtol=1e-5)
+
+
+@cases("distance", [1.5, 3.0, 8.0])
+def test_an_edge_is_as_soft_as_its_circle_of_confusion(distance: float) -> None:
+    """Half of the view is white, so a pixel shows the share of that circle, of the lens seen from it, on the one side.
+
+    Its radius on the film is f A |1 / focus - 1 / distance| for a focal length of f pixels and a lens of radius A.
+    """
+    focal, focus, aperture, side = 200.0, 3.0, 0.1, 60
+    camera = ThinLensCamera(**LEVEL, fov=2 * math.degrees(math.atan(side / 2 / focal)), aperture=aperture, focus=focus)
+    far = 10.0 * distance
+    corners = [[0, -far, -distance], [far, -far, -distance], [far, far, -distance], [0, far, -distance]]
+    wall = SceneObject(mesh=Mesh(corners, [[0, 1, 2], [0, 2, 3]]), material="m")
+    scene = Scene(camera=camera, materials={"m": Phong(diffuse=0, ambient=1)}, objects=[wall], ambient=1.0)
+    shares = render(scene, resolution=side, samples=256, window=(0, 15, side, 45)).radiance[..., 0].mean(axis=0)
+    radius = focal * aperture * abs(1 / focus - 1 / distance)
+    # The share of a disc on one side of a chord, and its mean over each pixel.
+    places = (np.arange(side * 64) + 0.5) / 64 - side / 2
+    chord = np.clip(places / max(radius, 1e-9), -1, 1)
+    expected = 0.5 + (np.arcsin(chord) + chord * np.sqrt(1 - chord**2)) / math.pi
+    np.testing.assert_allclose(shares, expected.reshape(side, 64).mean(axis=1), atol=3e-3)
+    assert (radius > 2) == (distance != focus)

@@ -10,6 +10,7 @@ from renderer import (
     EquirectangularCamera,
     FisheyeCamera,
     Octree,
+    OpenCVCamera,
     OpenCVFisheyeCamera,
     OrthographicCamera,
     PerspectiveCamera,
@@ -22,7 +23,9 @@ from renderer.studies import depth_map
 pytestmark = pytest.mark.judges(
     "EquirectangularCamera.film_size", "EquirectangularCamera.frame", "EquirectangularCamera.primary_rays",
     "EquirectangularCamera.project", "EquirectangularCamera.rays", "FisheyeCamera.film_size", "FisheyeCamera.frame",
-    "FisheyeCamera.primary_rays", "FisheyeCamera.project", "FisheyeCamera.rays", "OpenCVFisheyeCamera.film_size",
+    "FisheyeCamera.primary_rays", "FisheyeCamera.project", "FisheyeCamera.rays", "OpenCVCamera.film_size",
+    "OpenCVCamera.frame", "OpenCVCamera.primary_rays", "OpenCVCamera.project", "OpenCVCamera.rays",
+    "OpenCVFisheyeCamera.film_size",
     "OpenCVFisheyeCamera.frame", "OpenCVFisheyeCamera.primary_rays", "OpenCVFisheyeCamera.project",
     "OpenCVFisheyeCamera.rays", "OrthographicCamera.film_size", "OrthographicCamera.frame",
     "OrthographicCamera.primary_rays", "OrthographicCamera.project", "OrthographicCamera.rays",
@@ -42,6 +45,9 @@ CAMERAS = [
     ThinLensCamera(**PLACE, fov=60, aperture=0.5),
     EquirectangularCamera(**PLACE),
     FisheyeCamera(**PLACE, fov=330),
+    OpenCVCamera(
+        **PLACE, width=64, height=48, fx=50.0, fy=45.0, cx=20.5, skew=4.0, k1=-0.2, k2=0.05, p1=0.01, p2=-0.02
+    ),
     OpenCVFisheyeCamera(**PLACE, width=64, height=48, fx=25.0, fy=22.0, cx=30.5, skew=1.0, k1=0.05, k2=-0.002),
 ]
 AROUND = [camera for camera in CAMERAS if camera.type in ("equirectangular", "fisheye", "opencv_fisheye")]

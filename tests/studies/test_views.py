@@ -12,11 +12,13 @@ from renderer import (
     FisheyeCamera,
     Mesh,
     Octree,
+    OpenCVCamera,
     OpenCVFisheyeCamera,
     OrthographicCamera,
     PerspectiveCamera,
     Phong,
     PinholeCamera,
+    RayScene,
     Scene,
     SceneObject,
     ThinLensCamera,
@@ -49,6 +51,9 @@ CAMERAS = [
     ),
     FisheyeCamera(eye=(0.5, 1.5, 3.0), target=(0.0, 0.1, 0.0), fov=70.0),
     EquirectangularCamera(eye=(0.5, 0.3, 0.3), target=(0.0, 0.1, 0.0)),
+    OpenCVCamera(
+        eye=(0.5, 1.5, 3.0), target=(0.0, 0.1, 0.0), width=61, height=47, fx=60.0, fy=55.0, cx=25.0, k1=-0.4, p2=0.02
+    ),
     OpenCVFisheyeCamera(
         eye=(0.5, 1.5, 3.0), target=(0.0, 0.1, 0.0), width=61, height=47, fx=50.0, fy=60.0, k1=0.1, k3=-0.05
     ),
@@ -145,6 +150,36 @@ def test_z_is_the_part_of_the_distance_along_the_axis(camera):
         np.testing.assert_allclose(own, z, rtol=1e-13)
 
 
+@cases("camera", CAMERAS)
+def test_a_scan_has_the_depths_of_a_camera_at_the_pixels_of_its_points(camera):
+    octree, size = Octree.from_mesh(torus()), (61, 47)
+    cloud, depth = scan(octree, camera, size), depth_map(octree, camera, *size).ravel()
+    np.testing.assert_array_equal(cloud.rays, np.flatnonzero(np.isfinite(depth)))
+    np.testing.assert_allclose(cloud.distances, depth[cloud.rays], rtol=1e-15)
+    rows, columns = np.divmod(cloud.rays, size[0])
+    pixels, away = camera.project(cloud.points, size)
+    np.testing.assert_allclose(pixels, np.stack([columns, rows], axis=1) + 0.5, atol=1e-10)
+    np.testing.assert_allclose(away, cloud.distances, rtol=1e-13)
+    if camera.film_size is not None:
+        np.testing.assert_array_equal(scan(octree, camera).rays, scan(octree, camera, camera.film_size).rays)
+
+
+def test_a_camera_scans_scenes_in_blocks_through_glass_and_from_a_surface(monkeypatch):
+    scene, camera = RayScene(), OrthographicCamera(eye=(0.5, 0.25, 1.0), target=(0.5, 0.25, 0.0), height=0.5)
+    pane, wall = scene.add(box()), scene.add(box((0, 0, -3), (1, 1, -2)))
+    for _ in range(2):
+        cloud = scan(scene, camera, (3, 2), returns=3, through=pane)
+        # It stands on the pane.
+        np.testing.assert_allclose(cloud.distances, [0.0, 1.0, 3.0] * 6, rtol=1e-13)
+        assert cloud.rays.tolist() == np.repeat(range(6), 3).tolist()
+        assert cloud.objects.tolist() == [pane, pane, wall] * 6
+        monkeypatch.setattr(scanner, "_ROWS", 4)
+    away = PerspectiveCamera(eye=(0, 0, 9), target=(0, 0, 99))
+    assert len(scan(scene, away, (2, 2)).rays) == 0
+    nothing = OpenCVFisheyeCamera(eye=(0, 0, 9), target=(0, 0, 0), width=4, height=3, fx=1, fy=1, cx=99, k1=-0.5)
+    assert len(scan(scene, nothing).rays) == 0
+
+
 @cases("integer", [np.int16, np.uint64])
 def test_counts_may_be_integers_of_numpy(integer):
     octree, flat = Octree.from_mesh(torus()), Octree.from_mesh(box())
@@ -208,6 +243,11 @@ def test_rows_of_a_camera_of_ones_own_may_be_a_list():
         ),
         (lambda o: depth_map(o, _camera_of(np.zeros((6, 3))), 5, 5), "camera", "non-zero directions, got"),
         (lambda o: scan(o, [[0, 0, 9]]), "origin", "shape"),
+        (lambda o: scan(o, CAMERAS[0]), "pattern", "width and height of the camera's film.* got None"),
+        (lambda o: scan(o, CAMERAS[0], 100), "pattern", "width and height.* got 100"),
+        (lambda o: scan(o, CAMERAS[0], (5, 1 << 17)), "pattern", "from 1 to 65536"),
+        (lambda o: scan(o, CAMERAS[2], (5, 50)), "resolution", "122 x 94"),
+        (lambda o: scan(o, CAMERAS[0], (5, 5), normal=[0, 0, 1]), "normal", "is a camera"),
         (lambda o: scan(o, [0, 0, 9], 0), "pattern", "an integer from 1"),
         (lambda o: scan(o, [0, 0, 9], np.int64(0)), "pattern", "an integer from 1"),
         (lambda o: scan(o, [0, 0, 9], [[0, 0, 0]]), "pattern", "in row 0"),

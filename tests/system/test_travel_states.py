@@ -135,7 +135,8 @@ TEXTURE = renderer.Texture(np.eye(2))
 _PLACE = {"eye": (0, 0, 6), "target": (0, 0, 0)}
 _FILM = {"width": 8, "height": 6, "fx": 5, "fy": 5}
 CAMERAS = [
-    renderer.PinholeCamera(**_PLACE, **_FILM), renderer.OpenCVFisheyeCamera(**_PLACE, **_FILM),
+    renderer.PinholeCamera(**_PLACE, **_FILM), renderer.OpenCVCamera(**_PLACE, **_FILM),
+    renderer.OpenCVFisheyeCamera(**_PLACE, **_FILM),
     renderer.FisheyeCamera(**_PLACE), renderer.EquirectangularCamera(**_PLACE),
     renderer.ThinLensCamera(**_PLACE, aperture=0.1),
 ]  # fmt: skip

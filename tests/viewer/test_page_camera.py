@@ -10,6 +10,7 @@ import tomlkit
 from renderer import (
     EquirectangularCamera,
     FisheyeCamera,
+    OpenCVCamera,
     OrthographicCamera,
     PerspectiveCamera,
     Phong,
@@ -35,6 +36,7 @@ PINHOLE = PinholeCamera(**PLACE, width=33, height=20, fx=30.0, fy=10.0, cx=5.0)
     [
         (PINHOLE, 90.0), (ThinLensCamera(**PLACE, aperture=0.1, fov=30.0), 30.0), (FisheyeCamera(**PLACE), 90.0),
         (EquirectangularCamera(**PLACE), 90.0),
+        (OpenCVCamera(**PLACE, width=33, height=20, fx=30.0, fy=10.0, k1=-0.1), 90.0),
     ],
 )  # fmt: skip
 def test_another_camera_is_shown_as_a_perspective_one_at_its_place(camera: Any, fov: float) -> None:

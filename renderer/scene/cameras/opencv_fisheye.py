@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import reduce
 from typing import Literal
 
 import numpy as np
@@ -12,6 +11,7 @@ from renderer.arguments.arrays import real_argument
 from renderer.arguments.fields import stated
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
+from renderer.numerics.polynomials import least_positive_root, polynomial
 from renderer.scene.cameras.base import AngularCamera, Floats
 from renderer.scene.cameras.calibrated import CalibratedCamera, Number, opencv_extrinsics, opencv_intrinsics
 from renderer.scene.cameras.fisheye import turned_away
@@ -132,16 +132,16 @@ class OpenCVFisheyeCamera(CalibratedCamera, AngularCamera):
     def _distance(self, angle: Floats) -> tuple[Floats, Floats]:
         """How far from the principal point a ray at an angle falls, in focal lengths, and its derivative."""
         square = angle * angle
-        powers = (self.k4, self.k3, self.k2, self.k1, 1.0)
-        slopes = (9.0 * self.k4, 7.0 * self.k3, 5.0 * self.k2, 3.0 * self.k1, 1.0)
-        return angle * _polynomial(powers, square), _polynomial(slopes, square)
+        powers = (1.0, self.k1, self.k2, self.k3, self.k4)
+        return angle * polynomial(powers, square), polynomial(self._slopes(), square)
+
+    def _slopes(self) -> tuple[float, ...]:
+        """The coefficients of the derivative in the angle's square."""
+        return 1.0, 3.0 * self.k1, 5.0 * self.k2, 7.0 * self.k3, 9.0 * self.k4
 
     def _widest(self) -> float:
         """The angle up to which the distance grows, at most a half turn."""
-        # In s = 1 / angle^2, whose highest power has the coefficient 1.
-        roots = np.roots(np.array([1.0, 3.0 * self.k1, 5.0 * self.k2, 7.0 * self.k3, 9.0 * self.k4]))
-        turns = roots.real[(np.abs(roots.imag) <= 1e-9 * np.abs(roots)) & (roots.real > 0.0)]
-        return 1.0 / math.sqrt(turns.max(initial=math.pi**-2.0))
+        return math.sqrt(min(least_positive_root(self._slopes()), math.pi**2))
 
     def _angle(self, distance: Floats) -> Floats:
         """The inverse of ``_distance``, by Newton's method within bounds; NaN where there is none."""
@@ -156,8 +156,3 @@ class OpenCVFisheyeCamera(CalibratedCamera, AngularCamera):
                 angle = angle - error / slope
             angle = np.where((angle >= least) & (angle <= most), angle, 0.5 * (least + most))
         return np.where(distance > self._distance(np.asarray(widest))[0], np.nan, angle)
-
-
-def _polynomial(coefficients: tuple[float, ...], x: Floats) -> Floats:
-    """A polynomial's values by Horner's rule, the highest power first."""
-    return reduce(lambda value, coefficient: value * x + coefficient, coefficients, np.zeros_like(x))

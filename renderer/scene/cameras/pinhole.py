@@ -38,6 +38,10 @@ class PinholeCamera(CalibratedCamera, CentralCamera):
     SceneError
         For values that are not finite or out of range, or an R that is not a rotation within 1e-4.
 
+    See Also
+    --------
+    OpenCVCamera : with distortion
+
     Examples
     --------
     >>> from renderer import PinholeCamera
