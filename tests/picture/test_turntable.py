@@ -118,7 +118,7 @@ def test_cut_pixels_are_said_once(scene: Any, tmp_path: Path, capsys: pytest.Cap
     [
         (["-o", "a.png", "--frames", "3"], "output: expected a .gif, .webp or .mp4 file, got 'a.png'"),
         (["-o", "a.gif"], "output: expected a .png, .exr or .npy file, got 'a.gif'"),
-        (["-o", "a.gif", "--frames", "3", "--cluster"], "--frames: expected a turntable of this machine, got --clu"),
+        (["-o", "a.gif", "--frames", "3", "--cluster"], "--frames: expected a picture of this machine, got --cluster"),
         (["-o", "a.gif", "--frames", "3", "--transparent"], "--transparent: expected a .png file, got 'a.gif'"),
         (["-o", "a.mp4", "--frames", "3"], "output: expected the package imageio-ffmpeg for an .mp4 file, got none"),
         (["-o", "a.gif", "--frames", "1"], "argument --frames: expected an integer from 2 to 3600, got '1'"),
