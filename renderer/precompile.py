@@ -44,6 +44,7 @@ _TRIANGLE = Mesh([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0, 1, 2]
 # An icosphere of 20,480 faces: enough that its tree is built in parts, and quickly.
 _SUBDIVISIONS = 5
 _GLASS = Dielectric(type="dielectric", ior=1.5)
+_GLOWING = Phong(emission=1.0)
 
 
 class Part(NamedTuple):
@@ -116,9 +117,9 @@ def _search() -> None:
     BruteForce.from_mesh(_TRIANGLE).closest_hit([[0.1, 0.1, 1.0]], [[0.0, 0.0, -1.0]])
 
 
-def _render() -> None:
+def _render(material: Material = _GLASS) -> None:
     # Brute force, so that no tree is built.
-    render(_scene(_GLASS), resolution=(1, 1), accelerator="brute")
+    render(_scene(material), resolution=(1, 1), accelerator="brute")
 
 
 def _view() -> None:
@@ -142,11 +143,15 @@ _QUERIES = (
     Part("winding numbers", _wind),
     Part("studies", _study),
 )
-_PICTURES = (Part("pictures", _render), Part("the viewer", _view))
+_PICTURES = (
+    Part("pictures", _render),
+    Part("pictures with textures", partial(_render, _GLOWING)),
+    Part("the viewer", _view),
+)
 # By the name of the command's option.
 PARTS: dict[str, tuple[Part, ...]] = {
     "queries": _QUERIES,
-    "pictures": (*_QUERIES, *_PICTURES[:1]),
+    "pictures": (*_QUERIES, *_PICTURES[:2]),
     "all": (*_QUERIES, *_PICTURES),
 }
 
@@ -178,8 +183,9 @@ def touch_viewing(prepared: PreparedScene) -> None:
     prepared.octree.closest_hit(eye, forward, t_error=True)
 
 
-def compile_in_two() -> None:
-    """Before a first picture: compile the kernels that build trees here and those that render in another process.
+def compile_in_two(textures: bool = False) -> None:
+    """Before a first picture, or one with ``textures``: compile the kernels that build trees here and those that render
+    in another process.
 
     Does nothing if they are on disk. If the other process fails, its last line of output is logged, and its kernels are
     compiled here when needed.
@@ -189,7 +195,7 @@ def compile_in_two() -> None:
     log = getLogger("renderer.jit")
     log.info("compiling render_tile in another process meanwhile (once)")
     with subprocess.Popen(
-        child.command(f"{__name__}:compile_picture"),
+        child.command(f"{__name__}:{'compile_textured_picture' if textures else 'compile_picture'}"),
         env=child.environment(**{QUIET_VARIABLE: "1"}),
         stdin=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -216,6 +222,12 @@ def compile_picture() -> None:
     """
     Thread(target=_end_with_input, daemon=True).start()
     _render()
+
+
+def compile_textured_picture() -> None:
+    """``compile_picture`` for scenes with textures."""
+    Thread(target=_end_with_input, daemon=True).start()
+    _render(_GLOWING)
 
 
 def _end_with_input() -> None:

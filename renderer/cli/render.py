@@ -142,8 +142,9 @@ def _rendered_here(scene: Any, asked: dict[str, Any], options: argparse.Namespac
     from renderer.picture.image import CutWarning
     from renderer.picture.render import prepare, render
     from renderer.precompile import compile_in_two
+    from renderer.scene.needs import needs_of
 
-    compile_in_two()
+    compile_in_two(needs_of(scene).textures)
     warnings.simplefilter("ignore", CutWarning)  # reported on one line
     source, asked = scene, {**asked, "threads": options.threads}
     if options.transparent:

@@ -31,6 +31,7 @@ def render_turntable(scene: Any, asked: dict[str, Any], options: argparse.Namesp
     from renderer.picture.animation import check_animation_path, write_animation
     from renderer.picture.image import CutWarning
     from renderer.precompile import compile_in_two
+    from renderer.scene.needs import needs_of
     from renderer.scene.scene import checked_settings
     from renderer.system.files import write_atomically
 
@@ -40,7 +41,7 @@ def render_turntable(scene: Any, asked: dict[str, Any], options: argparse.Namesp
     even = format != "mp4" or width % 2 == height % 2 == 0
     expect(even, "--resolution", "even numbers for an .mp4 file", f"{width} x {height}")
     began, cuts = time.perf_counter(), list[tuple[int, str]]()
-    compile_in_two()
+    compile_in_two(needs_of(scene).textures)
     warnings.simplefilter("ignore", CutWarning)  # reported on one line
     with progress_bar(count, "frame", not options.quiet) as update:
         frames = _frames(scene, asked, options, update, cuts)
