@@ -3,6 +3,7 @@
 Other pictures have kernels without any of this, chosen when they are compiled.
 """
 
+import math
 from typing import Any, NamedTuple
 
 from renderer.jit.decorators import inlined, kernel
@@ -43,6 +44,8 @@ OWN_COLORS = (*COLORS, MATERIAL_COLUMNS)
 _TINTED = (AMBIENT, DIFFUSE, MATERIAL_COLUMNS)
 # The least cosine of a ray to a face's normal: at a smaller one an ellipse is as long as at this.
 _GRAZING = 2.0**-10
+# Of a smaller sine rounding may leave no direction.
+_STRAIGHT = 2.0**-20
 
 
 class LookWays(NamedTuple):
@@ -113,17 +116,22 @@ def _patch_at(scene, at, u, v, d, width, facet):
     if not (width > 0.0 and facet.double_area > 0.0):
         return here
     p0, p1, p2 = scene.ways.corners(scene, at)
-    e, f = scale(sub(p1, p0), 1.0 / facet.double_area), scale(sub(p2, p0), 1.0 / facet.double_area)
-    n, facing = facet.normal, dot(d, facet.normal)
-    along = sub(d, scale(n, facing))
+    n, e, f = facet.normal, sub(p1, p0), sub(p2, p0)
+    # How the barycentrics grow over the face, times the doubled area, and so the coordinates.
+    grows_u, grows_v, each = cross(f, n), cross(n, e), width / facet.double_area
+    du, dv, eu, ev = (u1 - u0) * each, (v1 - v0) * each, (u2 - u0) * each, (v2 - v0) * each
+    grad_u, grad_v = add(scale(grows_u, du), scale(grows_v, eu)), add(scale(grows_u, dv), scale(grows_v, ev))
+    facing = dot(d, n)
+    sine = math.sqrt(maximum(1.0 - facing * facing, 0.0))
     # Seen straight on, the ellipse is a circle, and any direction is along it.
-    along = normalized(along if largest_component(along) > 1e-9 else e)
-    across = scale(cross(n, along), width)
-    along = scale(along, width / maximum(abs(facing), _GRAZING))
-    a, b = dot(cross(along, f), n), dot(cross(e, along), n)
-    c, g = dot(cross(across, f), n), dot(cross(e, across), n)
-    du, dv, eu, ev = u1 - u0, v1 - v0, u2 - u0, v2 - v0
-    return Patch(here.u, here.v, a * du + b * eu, a * dv + b * ev, c * du + g * eu, c * dv + g * ev)
+    if sine < _STRAIGHT:
+        d, sine, facing = e, math.sqrt(dot(e, e)), 1.0
+    along, across = sub(d, scale(n, dot(d, n))), cross(n, d)
+    longer, shorter = 1.0 / (sine * maximum(abs(facing), _GRAZING)), 1.0 / sine
+    return Patch(
+        here.u, here.v, dot(along, grad_u) * longer, dot(along, grad_v) * longer,
+        dot(across, grad_u) * shorter, dot(across, grad_v) * shorter,
+    )  # fmt: skip
 
 
 @inlined
