@@ -142,7 +142,11 @@ def _rgb(lanes):
 @inlined
 def _opacity(scene, maps, patch):
     opacity, texture = load(scene.maps, maps + OPACITY), load(scene.maps, maps + OPACITY_MAP)
-    return opacity * extract(texture_at(scene, int(texture), patch), 3) if texture >= 0.0 else opacity
+    return (
+        opacity * extract(texture_at(scene.textures, scene.texels, int(texture), patch), 3)
+        if texture >= 0.0
+        else opacity
+    )
 
 
 @kernel
@@ -177,7 +181,7 @@ def _put_mapped(scene, maps, patch, own):
         if texture >= 0.0:
             # Ambient and diffuse light mostly share theirs.
             if texture != last:
-                last, values = texture, texture_at(scene, int(texture), patch)
+                last, values = texture, texture_at(scene.textures, scene.texels, int(texture), patch)
             put3(own, OWN_COLORS[k], times(three(own, OWN_COLORS[k]), _rgb(values)))
 
 
@@ -192,7 +196,9 @@ def _mapped_normal(scene, spot, look, d, width):
     along, other = _tangents(scene, at, n)
     if largest_component(along) == 0.0:
         return n
-    r, g, b = _rgb(texture_at(scene, number, _patch_at(scene, at, spot.u, spot.v, d, width, look.facet)))
+    r, g, b = _rgb(
+        texture_at(scene.textures, scene.texels, number, _patch_at(scene, at, spot.u, spot.v, d, width, look.facet))
+    )
     strength = load(scene.textures, number * TEXTURE_COLUMNS + STRENGTH)
     x, y, z = strength * (2.0 * r - 1.0), strength * (2.0 * g - 1.0), 2.0 * b - 1.0
     return normalized(add(add(scale(along, x), scale(other, y)), scale(n, z)))

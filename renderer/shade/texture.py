@@ -53,28 +53,28 @@ class _Level(NamedTuple):
 
 
 @kernel
-def texture_at(scene, texture, patch):
+def texture_at(textures, texels, texture, patch):
     """Four lanes, red, green, blue and alpha: a texture at the middle of a ``Patch``, a MIPMAP about its mean there."""
     row = texture * TEXTURE_COLUMNS
-    x, y = _moved(scene.textures, row, patch.u, patch.v)
+    x, y = _moved(textures, row, patch.u, patch.v)
     image = _Level(
-        np.int64(load(scene.textures, row + TEXEL)),
-        np.int64(load(scene.textures, row + ACROSS)),
-        np.int64(load(scene.textures, row + DOWN)),
+        np.int64(load(textures, row + TEXEL)),
+        np.int64(load(textures, row + ACROSS)),
+        np.int64(load(textures, row + DOWN)),
     )
-    filter_ = load(scene.textures, row + FILTER)
+    filter_, wraps = load(textures, row + FILTER), (load(textures, row + WRAP), load(textures, row + WRAP + 1))
     if filter_ == NEAREST:
-        return _nearest(scene, row, image, x, y)
+        return _nearest(texels, wraps, image, x, y)
     if filter_ == MIPMAP:
-        along = _turned(scene.textures, row, patch.along_u, patch.along_v)
-        across = _turned(scene.textures, row, patch.across_u, patch.across_v)
+        along = _turned(textures, row, patch.along_u, patch.along_v)
+        across = _turned(textures, row, patch.across_u, patch.across_v)
         longer, shorter = _texels(along, image), _texels(across, image)
         if shorter > longer:
             along, across, longer = across, along, shorter
         if longer > 1.0:
             area = abs(along[0] * across[1] - along[1] * across[0]) * (image.wide * image.high)
-            return _mean(scene, row, image, (x, y), along, longer, area)
-    return _between_four(scene, row, image, x, y)
+            return _mean(texels, wraps, np.int64(load(textures, row + LEVELS)), image, (x, y), along, longer, area)
+    return _between_four(texels, wraps, image, x, y)
 
 
 @inlined
@@ -103,25 +103,27 @@ def _texels(axis, image):
 
 
 @kernel
-def _mean(scene, row, image, middle, along, longer, area):
+def _mean(texels, wraps, levels, image, middle, along, longer, area):
     """About the mean over an ellipse: that of several circles on its longer axis, which is above one texel.
 
     ``longer`` is the length of that axis, and ``area`` that of the ellipse times 4 / pi, in texels.
     """
-    levels = np.int64(load(scene.textures, row + LEVELS))
     whole = not longer < _LONGEST
     # Fewer circles than would fill the ellipse are wider.
     count = 1 if whole else np.int64(minimum(longer * longer / maximum(area, longer), _MOST_MEANS) + 0.5)
     number, share = _level_of(_LONGEST if whole else longer / count, levels)
+    # Of several circles each from one level, as their mean is smooth without blending.
+    if count > 1:
+        number, share = (number + 1, 0.0) if share > 0.5 else (number, 0.0)
     for _ in range(number):
         image = _half(image)
     total = splat4(0.0)
     for k in range(count):
         step = (k + 0.5) / count - 0.5
         x, y = middle[0] + (0.0 if whole else along[0] * step), middle[1] + (0.0 if whole else along[1] * step)
-        found = _between_four(scene, row, image, x, y)
+        found = _between_four(texels, wraps, image, x, y)
         if share > 0.0:
-            found = _mixed(found, _between_four(scene, row, _half(image), x, y), share)
+            found = _mixed(found, _between_four(texels, wraps, _half(image), x, y), share)
         total = total + found
     return total * (1.0 / count)
 
@@ -167,40 +169,40 @@ def _wrapped(rule, i, count):
 
 
 @inlined
-def _column(scene, row, image, i):
-    return image.first + _wrapped(load(scene.textures, row + WRAP), i, image.wide)
+def _column(wraps, image, i):
+    return image.first + _wrapped(wraps[0], i, image.wide)
 
 
 @inlined
-def _line(scene, row, image, j):
+def _line(wraps, image, j):
     # The first row is the upper one; v points up.
-    return (image.high - 1 - _wrapped(load(scene.textures, row + WRAP + 1), j, image.high)) * image.wide
+    return (image.high - 1 - _wrapped(wraps[1], j, image.high)) * image.wide
 
 
 @inlined
-def _place(scene, row, image, x, y):
+def _place(wraps, image, x, y):
     """A place in texels."""
-    x, y = _folded(load(scene.textures, row + WRAP), x), _folded(load(scene.textures, row + WRAP + 1), y)
+    x, y = _folded(wraps[0], x), _folded(wraps[1], y)
     return x * image.wide, y * image.high
 
 
 @inlined
-def _nearest(scene, row, image, x, y):
-    x, y = _place(scene, row, image, x, y)
-    at = _column(scene, row, image, np.int64(np.floor(x))) + _line(scene, row, image, np.int64(np.floor(y)))
-    return load4(scene.texels, CHANNELS * at)
+def _nearest(texels, wraps, image, x, y):
+    x, y = _place(wraps, image, x, y)
+    at = _column(wraps, image, np.int64(np.floor(x))) + _line(wraps, image, np.int64(np.floor(y)))
+    return load4(texels, CHANNELS * at)
 
 
 @kernel
-def _between_four(scene, row, image, x, y):
+def _between_four(texels, wraps, image, x, y):
     """The value at a place from the four texels around it."""
-    x, y = _place(scene, row, image, x, y)
+    x, y = _place(wraps, image, x, y)
     left, low = np.floor(x - 0.5), np.floor(y - 0.5)
     s, t, i, j = x - 0.5 - left, y - 0.5 - low, np.int64(left), np.int64(low)
-    left, right = _column(scene, row, image, i), _column(scene, row, image, i + 1)
-    low, high = _line(scene, row, image, j), _line(scene, row, image, j + 1)
-    lower = _mixed(load4(scene.texels, CHANNELS * (left + low)), load4(scene.texels, CHANNELS * (right + low)), s)
-    upper = _mixed(load4(scene.texels, CHANNELS * (left + high)), load4(scene.texels, CHANNELS * (right + high)), s)
+    left, right = _column(wraps, image, i), _column(wraps, image, i + 1)
+    low, high = _line(wraps, image, j), _line(wraps, image, j + 1)
+    lower = _mixed(load4(texels, CHANNELS * (left + low)), load4(texels, CHANNELS * (right + low)), s)
+    upper = _mixed(load4(texels, CHANNELS * (left + high)), load4(texels, CHANNELS * (right + high)), s)
     return _mixed(lower, upper, t)
 
 
