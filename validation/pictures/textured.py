@@ -16,12 +16,12 @@ from renderer.mesh.shapes import icosphere
 from renderer.mesh.texture import Texture
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.light import DirectionalLight, PointLight
-from renderer.scene.scene import Scene, SceneObject
+from renderer.scene.scene import RenderSettings, Scene, SceneObject
 
 _CAMERA = PerspectiveCamera(eye=(0.4, 2.1, 3.9), target=(0.03, 0.35, 0.02), fov=41.0)
 _LIGHTS = (
-    DirectionalLight(direction=(0.5, -1.3, -0.6), irradiance=(0.5, 0.6, 0.55)),
-    PointLight(position=(1.7, 3.1, 1.4), intensity=(4.0, 3.5, 3.0)),
+    DirectionalLight(direction=(0.5, -1.3, -0.6), irradiance=(0.3, 0.4, 0.35)),
+    PointLight(position=(1.7, 3.1, 1.4), intensity=(2.4, 2.1, 1.8)),
 )
 # From texture coordinates to an image: turned, stretched and moved.
 _MOVED = ((1.31, 0.42, 0.17), (-0.37, 0.94, -0.23))
@@ -75,6 +75,7 @@ def _row(name: str, shows: str, ground: Material, leaf: Material | None = None) 
         lights=_LIGHTS,
         ambient=(0.1, 0.15, 0.2),
         background=(0.2, 0.3, 0.5),
+        render=RenderSettings(resolution=(192, 128)),
     )
     return Row(f"textures: {name}", shows, scene)
 

@@ -82,8 +82,11 @@ class Recursion:
         si = self.scene.ray_intersect(ray)
         while si.is_valid() and not self.is_there(si):
             si = self.scene.ray_intersect(si.spawn_ray(ray.d))
-            si.t = float(sum((si.p - ray.o) * ray.d))
-        if si.is_valid() and si.shape in self.maps:
+        if not (self.maps and si.is_valid()):
+            return si
+        # Behind a hole the ray began anew.
+        si.t = float(sum((si.p - ray.o) * ray.d))
+        if si.shape in self.maps:
             self.maps[si.shape].turn(si, ray.d)
         return si
 
