@@ -158,7 +158,8 @@ def _check_aovs(
     """Compare the camera's rays with those of Mitsuba's own sensor, and then their hits, which Mitsuba has ``made``."""
     cameras = [] if mitsuba_camera.can_judge(scene.camera) else [_camera_gate(name, scene.camera, resolution, job)]
     theirs, seconds = made
-    ours = picture(scene, resolution, "bounded", max_depth=0)
+    # Behind holes of masks rays start anew, by the same rule.
+    ours = picture(scene, resolution, "mitsuba", max_depth=0)
     record, found, off = aovs.compare(name, scene, ours, theirs, job.thresholds.aovs)
     if not job.own:
         found = [verdict.primary_gate(f"{name}, AOVs", scene, ours, off)]

@@ -1,12 +1,14 @@
 """The laws of optics, written a second time: mirrored and refracted directions, and their shares."""
 
 from collections.abc import Iterator
+from typing import get_args
 
 import numpy as np
 
+from renderer.materials.base import appearance_of
 from renderer.materials.dielectric import Dielectric
 from renderer.materials.registry import Material
-from validation.references.ray_tree import Node, Vector
+from validation.references.ray_tree import Kind, Node, Vector
 
 # The textbook's formula for refraction loses digits near the critical angle, and is not compared within this of it.
 _CRITICAL = 1e-6
@@ -15,7 +17,9 @@ _NEAR = 1e-9
 
 
 def wrong_rays(node: Node, material: Material) -> Iterator[str]:
-    """The rays that leave a surface of a material otherwise than the laws say."""
+    """The rays that leave a surface of a material otherwise than the laws say; of one with textures all but the shares,
+    which the reference judges.
+    """
     n = -node.shading if float(node.direction @ node.shading) > 0.0 else node.shading
     cosine = -float(node.direction @ n)
     n1, n2 = node.indices or (1.0, 1.0)
@@ -27,6 +31,10 @@ def wrong_rays(node: Node, material: Material) -> Iterator[str]:
     if isinstance(material, Dielectric):
         share = fresnel(cosine, np.sqrt(max(0.0, 1.0 - sine2)), n1, n2) if sine2 < 1.0 else 1.0
         reflected, through = share * reflected, (1.0 - share) * through
+    if not appearance_of(material).is_plain:
+        reflected, through = (
+            node.children[kind].share if kind in node.children else np.zeros(3) for kind in get_args(Kind)[1:]
+        )
     yield from _compared(node, "reflected", node.direction + 2.0 * cosine * n, reflected)
     bent = n1 / n2 * node.direction + (n1 / n2 * cosine - np.sqrt(max(0.0, 1.0 - sine2))) * n
     yield from _compared(node, "refracted", bent, through)

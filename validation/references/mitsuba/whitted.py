@@ -79,15 +79,13 @@ class Recursion:
 
     def hit(self, ray: mi.Ray3f) -> mi.SurfaceInteraction3f:
         """The first hit that no mask leaves out, with the shading normal of a map."""
-        si = self.scene.ray_intersect(ray)
+        si, before = self.scene.ray_intersect(ray), 0.0
         while si.is_valid() and not self.is_there(si):
+            before += si.t
             si = self.scene.ray_intersect(si.spawn_ray(ray.d))
-        if not (self.maps and si.is_valid()):
-            return si
-        # Behind a hole the ray began anew.
-        si.t = float(sum((si.p - ray.o) * ray.d))
-        if si.shape in self.maps:
+        if si.is_valid() and si.shape in self.maps:
             self.maps[si.shape].turn(si, ray.d)
+        si.t += before
         return si
 
     def is_there(self, si: mi.SurfaceInteraction3f) -> bool:
