@@ -3,7 +3,7 @@
 Images are of few large pixels, so that filters and wraps are seen, and nothing in them is symmetric.
 """
 
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +62,7 @@ def _row(name: str, shows: str, ground: Material, leaf: Material | None = None) 
     """A ground, a ball on it, a mirror behind it and a leaf above it; the leaf is of the ground's material if of no
     other, and the ball of the leaf's.
     """
-    parts = [
+    parts: list[tuple[str, Mesh, Literal["flat", "smooth"]]] = [
         ("ground", _ground(), "flat"),
         ("leaf", _ball(), "smooth"),
         ("leaf", _leaf(), "flat"),

@@ -1,7 +1,6 @@
 """The laws of optics, written a second time: mirrored and refracted directions, and their shares."""
 
 from collections.abc import Iterator
-from typing import get_args
 
 import numpy as np
 
@@ -32,12 +31,14 @@ def wrong_rays(node: Node, material: Material) -> Iterator[str]:
         share = fresnel(cosine, np.sqrt(max(0.0, 1.0 - sine2)), n1, n2) if sine2 < 1.0 else 1.0
         reflected, through = share * reflected, (1.0 - share) * through
     if not appearance_of(material).is_plain:
-        reflected, through = (
-            node.children[kind].share if kind in node.children else np.zeros(3) for kind in get_args(Kind)[1:]
-        )
+        reflected, through = _share(node, "reflected"), _share(node, "refracted")
     yield from _compared(node, "reflected", node.direction + 2.0 * cosine * n, reflected)
     bent = n1 / n2 * node.direction + (n1 / n2 * cosine - np.sqrt(max(0.0, 1.0 - sine2))) * n
     yield from _compared(node, "refracted", bent, through)
+
+
+def _share(node: Node, kind: Kind) -> Vector:
+    return node.children[kind].share if kind in node.children else np.zeros(3)
 
 
 def fresnel(cos_i: float, cos_t: float, n1: float, n2: float) -> float:

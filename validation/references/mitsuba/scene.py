@@ -193,9 +193,7 @@ def _mesh(index: int, instance: Instance, bsdf: mi.BSDF, look: Appearance) -> mi
     properties["bsdf"] = bsdf
     name, counts = f"instance{index}", (len(vertices), len(mesh.faces))
     mapped = len(look.textures) > 0
-    result = mi.Mesh(
-        name, *counts, has_vertex_normals=instance.smooth, has_vertex_texcoords=mapped, props=properties
-    )
+    result = mi.Mesh(name, *counts, has_vertex_normals=instance.smooth, has_vertex_texcoords=mapped, props=properties)
     if mapped:
         mi.traverse(result)["vertex_texcoords"] = np.asarray(mesh.texcoords, np.float32).ravel()
     fill(result, vertices, mesh.faces, instance.normals if instance.smooth else None)

@@ -52,13 +52,15 @@ class Maps:
         colors = {name: mi.Color3f(*getattr(self.look, name)) for name in _COLORS}
         for name, texture in self.colors.items():
             colors[name] = colors[name] * texture.eval(si)
-        for name in _TINTED if self.vertices is not None else ():
-            colors[name] = colors[name] * self.vertices.eval(si)
+        if self.vertices is not None:
+            for name in _TINTED:
+                colors[name] = colors[name] * self.vertices.eval(si)
         if self.look.blends:
             share = self._opacity(si)
             colors = {name: share * color for name, color in colors.items()}
             colors["transmittance"] = colors["transmittance"] + (1.0 - share)
-        return self.look._replace(**{name: tuple(color) for name, color in colors.items()})
+        seen: dict[str, Any] = {name: tuple(color) for name, color in colors.items()}
+        return self.look._replace(**seen)
 
     def is_there(self, si: mi.SurfaceInteraction3f) -> bool:
         """Whether no mask leaves out the surface at a hit."""

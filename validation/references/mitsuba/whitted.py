@@ -294,7 +294,9 @@ def aovs(scene: Scene, width: int, height: int, *, rays: mitsuba_scene.Rays | No
     for row, ray in enumerate(mitsuba_scene.mitsuba_rays(bundle)):
         si = tracer.hit(ray)
         if si.is_valid():
-            table[row] = si.t, *si.p, *si.n, *si.sh_frame.n
+            # Behind a hole of a mask a ray is beside its line by an offset.
+            place = ray(si.t) if tracer.maps else si.p
+            table[row] = si.t, *place, *si.n, *si.sh_frame.n
             instance[row] = shapes[si.shape]
     vectors = table[:, 1:].reshape(height, width, 3, 3)
     return Aovs(
