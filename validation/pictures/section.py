@@ -78,6 +78,9 @@ def check_scene(
     plan = plan_pictures(scene, effort)
     if scene.materials != whole.materials:
         plan.left_out["mip maps"] = "Mitsuba's bitmap has none; these textures are drawn with the filter linear"
+        job.say(f"{name}: mip maps are not judged: {plan.left_out['mip maps']}")
+    if plan.fault is not None:
+        job.say(f"{name}: pictures are not judged: {plan.fault}")
     record: dict[str, Any] = {
         "name": name,
         "shows": shows,
