@@ -83,7 +83,10 @@ class Maps:
 
 
 def maps_of(material: Material) -> Maps | None:
-    """The maps of a material; None for one that is the same all over its surface."""
+    """The maps of a material; None for one that is the same all over its surface.
+
+    Raises ``ValueError`` for a texture that Mitsuba does not have.
+    """
     look = appearance_of(material)
     if look.is_plain:
         return None
@@ -105,12 +108,19 @@ def can_judge(scene: Scene) -> str | None:
         look = appearance_of(scene.materials[instance.material])
         where = f"materials.{instance.material}"
         for name, texture in look.textures.items():
-            if texture.filter not in _FILTERS:
-                return f"{where}.{name}: Mitsuba's bitmap has no mip maps"
-            if texture.wrap[0] != texture.wrap[1]:
-                return f"{where}.{name}: Mitsuba's bitmap wraps alike along u and v, and this one {texture.wrap}"
+            fault = _fault(texture)
+            if fault is not None:
+                return f"{where}.{name}: {fault}"
         if "normal_map" in look.textures and _has_flat_texcoords(instance):
             return f"{where}.normal_map: Mitsuba has other tangents where texture coordinates do not grow"
+    return None
+
+
+def _fault(texture: Texture) -> str | None:
+    if texture.filter not in _FILTERS:
+        return "Mitsuba's bitmap has no mip maps"
+    if texture.wrap[0] != texture.wrap[1]:
+        return f"Mitsuba's bitmap wraps alike along u and v, not {' and '.join(texture.wrap)}"
     return None
 
 
@@ -147,6 +157,9 @@ def _is_checker(texture: Texture) -> bool:
 
 def _bitmap(texture: Texture, pixels: NDArray[Any], *, raw: bool) -> mi.Texture:
     """A texture of pixels (h, w, channels); those that are not ``raw`` are sRGB."""
+    fault = _fault(texture)
+    if fault is not None:
+        raise ValueError(f"texture: {fault}")
     bitmap = mi.Bitmap(np.array(pixels, order="C"))
     bitmap.set_srgb_gamma(not raw)
     return mi.load_dict(

@@ -246,14 +246,14 @@ def whitted(
     rays: mitsuba_scene.Rays | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> NDArray[np.float64]:
-    """The picture of ``scene`` by reference B, linear radiance (height, width, 3) float64.
+    """The picture of ``scene`` by reference B, linear radiance (height, width, 3) float64, without mip maps.
 
     max_depth : bounces followed, as in ``RenderSettings``; there is no ``min_weight``.
     samples : a square number of rays a pixel, on our regular grid.
     rays : origins and unit directions, (height * width, 3) each, instead of the camera's; ``samples`` is then unused.
     progress : called with the number of finished rows and of all rows.
     """
-    tracer, _ = recursion_of(scene, max_depth)
+    tracer, _ = recursion_of(textures.without_mip_maps(scene), max_depth)
     bundles = mitsuba_scene.camera_rays(scene, width, height, samples) if rays is None else [rays]
     weights = mitsuba_scene.camera_weights(scene, bundles)
     result = np.zeros((height, width, 3))
