@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 import pytest
 from cases import cases
@@ -9,12 +10,13 @@ from cases import cases
 from renderer.materials.phong import Phong
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.texture import Texture
-from renderer.scene.camera import OrthographicCamera
+from renderer.scene.camera import OrthographicCamera, primary_rays
 from renderer.scene.light import DirectionalLight
 from renderer.scene.scene import Scene, SceneObject
 from validation.references.mitsuba.path import can_judge as path_can_judge
+from validation.references.mitsuba.scene import mitsuba_rays
 from validation.references.mitsuba.textures import without_mip_maps
-from validation.references.mitsuba.whitted import aovs, can_judge, whitted
+from validation.references.mitsuba.whitted import aovs, can_judge, recursion_of, whitted
 
 FLOAT32 = 1e-5
 UNIT = [[0, 0], [1, 0], [1, 1], [0, 1]]
@@ -100,6 +102,28 @@ def test_normals_lean_along_u_and_v(mirrored: bool, strength: float) -> None:
     )
     expected = float(leaning @ to_light / np.linalg.norm(leaning) / np.linalg.norm(to_light))
     np.testing.assert_allclose(drawn(scene), expected, rtol=FLOAT32)
+
+
+def test_normals_are_those_of_the_plugin_normalmap() -> None:
+    """It has no strength, and on texture coordinates that are not mirrored it is ours."""
+    image = np.random.default_rng(1).uniform([0.3, 0.3, 0.9], [0.7, 0.7, 1.0], (3, 4, 3)).astype(np.float32)
+    texture = Texture(image, filter="linear")
+    scene = seen(
+        square(Phong(diffuse=1.0, normal_map=texture), texcoords=[[0.1, 0.2], [1.3, 0.5], [1.1, 1.4], [-0.2, 1.2]]),
+        lights=[DirectionalLight(direction=(-0.3, 0.2, -0.7))],
+    )
+    tracer, _ = recursion_of(scene, 0)
+    (maps,) = tracer.maps.values()
+    white = {"type": "diffuse", "reflectance": 1.0}
+    plain = {"use_shadowing_function": False, "flip_invalid_normals": False}
+    plugin = mi.load_dict({"type": "normalmap", "normalmap": maps.normals, "bsdf": white} | plain)
+    expected = []
+    for ray in mitsuba_rays(primary_rays(scene.camera, 8, 8)):
+        si = tracer.scene.ray_intersect(ray)
+        towards = mi.Vector3f(*np.array([0.3, -0.2, 0.7]) / np.sqrt(0.62))
+        expected.append(np.pi * np.array(plugin.eval(mi.BSDFContext(), si, si.to_local(towards))))
+    np.testing.assert_allclose(drawn(scene, 8).reshape(-1, 3), expected, rtol=FLOAT32)
+    assert np.ptp(expected) > 0.05
 
 
 def test_colors_of_vertices_are_linear_before_they_are_interpolated() -> None:

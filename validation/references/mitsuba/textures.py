@@ -25,7 +25,7 @@ _TINTED = ("ambient", "diffuse", "emission")
 _FILTERS = {"linear": "bilinear", "nearest": "nearest"}
 # (u, v) to (u, 1 - v).
 _OVER = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
-# No half an 8-bit step of a normal is as short as this.
+# Twice an area of texture coordinates; from smaller ones float32 makes no tangent.
 _LEAST = 1e-12
 
 

@@ -210,7 +210,7 @@ def recursion_of(
     # Mitsuba requires a BSDF for each shape, but only the surfaces' own lobes are sampled, so any will do.
     shapes = mitsuba_scene.meshes(scene, [mitsuba_scene.diffuse((0.0, 0.0, 0.0))] * len(surfaces))
     lights = tuple(mitsuba_scene.emitter(light) for light in scene.all_lights)
-    maps = {name: textures.maps_of(material) for name, material in scene.materials.items()}
+    maps = {name: textures.maps_of(scene.materials[name]) for name in {i.material for i in scene.instances}}
     of_shapes = {shape: maps[scene.instances[index].material] for shape, index in shapes.items()}
     recursion = kind(
         mitsuba_scene.assemble(shapes, lights),
