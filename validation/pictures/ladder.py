@@ -2,12 +2,13 @@
 
     diffuse     diffuse light alone. A lamp at the eye replaces the scene's lights: it lights all that the eye sees,
                 so no shadow is visible and no renderer needs a switch for shadows. Mirrors and glass are painted
-                grey, and there is no ambient light
+                grey, and nothing shines by ambient light or of itself
+    textures    maps of colours and of normals, colours of vertices, and masks, under the same lamp
     highlights  Phong's highlights, under the same lamp
     shadows     the scene's own lights, and with them their shadows
     mirrors     mirrors and constant reflectances
-    glass       dielectrics and constant transmittances
-    everything  the scene as it is, which adds ambient light
+    glass       dielectrics, constant transmittances, and surfaces that are partly there
+    everything  the scene as it is, which adds ambient light and emission
 
 The check of AOVs (``aovs``), which compares the primary hits, is below all rungs. Every rung keeps the background,
 which the rays that miss see. A rung that adds nothing to a scene is left out.
@@ -18,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from renderer.materials.base import appearance_of
 from renderer.materials.dielectric import Dielectric
 from renderer.materials.mirror import Mirror
 from renderer.materials.phong import Phong
@@ -29,14 +31,15 @@ from renderer.scene.sky import Sky
 
 _ADDS = {
     "diffuse": "direct diffuse light, of a lamp at the eye",
+    "textures": "textures, colours of vertices and masks",
     "highlights": "Phong highlights",
     "shadows": "the scene's lights and their shadows",
     "mirrors": "mirrors and constant reflectances",
-    "glass": "dielectrics and constant transmittances",
+    "glass": "dielectrics, constant transmittances and blends",
     "everything": "the scene as it is",
 }
 NAMES = tuple(_ADDS)
-_HIGHLIGHTS, _SHADOWS, _MIRRORS, _GLASS, _EVERYTHING = range(1, len(NAMES))
+_TEXTURES, _HIGHLIGHTS, _SHADOWS, _MIRRORS, _GLASS, _EVERYTHING = range(1, len(NAMES))
 
 _BLACK = (0.0, 0.0, 0.0)
 # The grey of mirrors and glass until their rung.
@@ -79,14 +82,23 @@ def _needless(scene: Scene) -> dict[str, str]:
     phong = [material for material in materials if isinstance(material, Phong)]
     needless = {}
     if not scene.all_lights:
-        needless = dict.fromkeys(("diffuse", "highlights", "shadows"), "the scene has no lights")
+        needless = dict.fromkeys(("diffuse", "textures", "highlights", "shadows"), "the scene has no lights")
     elif not any(any(material.specular) for material in phong):
         needless["highlights"] = "no surface of the scene has highlights"
+    if not any(map(_is_textured, phong)):
+        needless["textures"] = "no surface of the scene has textures or colours of vertices"
     if not any(isinstance(m, Mirror) for m in materials) and not any(any(m.reflectance) for m in phong):
         needless["mirrors"] = "no surface of the scene is a mirror or has a constant reflectance"
-    if not any(isinstance(m, Dielectric) for m in materials) and not any(any(m.transmittance) for m in phong):
-        needless["glass"] = "no surface of the scene is a dielectric or has a constant transmittance"
+    if not any(isinstance(m, Dielectric) for m in materials) and not any(m.passes_light for m in phong):
+        needless["glass"] = "no surface of the scene is a dielectric, has a constant transmittance or blends"
     return needless
+
+
+def _is_textured(material: Phong) -> bool:
+    """Whether the rung of textures shows any of a material's."""
+    look = appearance_of(material)
+    later = {"emission_map", "opacity_map"} if look.blends else {"emission_map"}
+    return look.vertex_colors is not None or look.cutoff > 0.0 or bool(look.textures.keys() - later)
 
 
 def _derived(scene: Scene, level: int) -> Scene:
@@ -107,7 +119,11 @@ def _reduced(material: Material, level: int) -> Material:
         return material if level >= _MIRRORS else _GREY
     if isinstance(material, Dielectric):
         return material if level >= _GLASS else _GREY
-    changes: dict[str, Any] = {}
+    changes: dict[str, Any] = {"emission": _BLACK}
+    if level < _TEXTURES:
+        changes |= dict.fromkeys(appearance_of(material).textures) | {"vertex_colors": None, "cutoff": 0.0}
+    if level < _GLASS and (level < _TEXTURES or material.cutoff == 0.0):
+        changes |= {"opacity": 1.0, "opacity_map": None}
     if level < _HIGHLIGHTS:
         changes["specular"] = _BLACK
     if level < _MIRRORS:

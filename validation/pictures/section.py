@@ -7,9 +7,8 @@ that differs must have a reason (``verdict``); on the suite's own, thresholds bo
 
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from renderer.picture.image import srgb
@@ -18,7 +17,7 @@ from renderer.scene.camera import Camera, PinholeCamera, ThinLensCamera
 from renderer.scene.scene import Scene, load_scene
 from validation.gates import Gate
 from validation.job import Job, Task
-from validation.pictures import aovs, monte_carlo, placement, unseen, verdict
+from validation.pictures import aovs, monte_carlo, placement, textured, unseen, verdict
 from validation.pictures.explain.media import open_glass
 from validation.pictures.files import write_png
 from validation.pictures.one_ray import picture
@@ -27,6 +26,7 @@ from validation.pictures.rung import Drawn, check_rung, draw
 from validation.references.mitsuba import camera as mitsuba_camera
 from validation.references.mitsuba import whitted as mitsuba_whitted
 from validation.references.mitsuba.scene import in_float32
+from validation.references.mitsuba.textures import without_mip_maps
 from validation.scenes import SCENE_CASES
 
 AOVS = "Mitsuba's primary hits (scalar_rgb)"
@@ -42,7 +42,7 @@ _CAMERAS = (
 def steps(job: Job) -> int:
     """Number of calls of ``job.step`` in ``run``: those of the suite's own, the others by the scenes' plans."""
     return job.own * (1 + unseen.steps()) + sum(
-        plan_pictures(load_scene(path), effort).steps for _, _, path, effort in scenes_of(job)
+        plan_pictures(without_mip_maps(scene), effort).steps for _, _, scene, effort in scenes_of(job)
     )
 
 
@@ -50,8 +50,8 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
     """Check every scene; writes PNGs into ``job.folder`` and returns a record for JSON and the gates."""
     records: list[dict[str, Any]] = []
     found: list[Gate] = []
-    for name, shows, path, effort in scenes_of(job):
-        record, passed = check_scene(name, shows, load_scene(path), effort, job)
+    for name, shows, scene, effort in scenes_of(job):
+        record, passed = check_scene(name, shows, scene, effort, job)
         records.append(record)
         found += passed
     result: dict[str, Any] = {"scenes": records, "costs": costs_of(records)}
@@ -71,11 +71,16 @@ def check_scene(
 
     A rung that no reference can judge fails a gate; the record lists each rung or reference that is left out with its
     reason. Pictures have one ray a pixel and no smallest weight, which no reference has. All draw the meshes as float32
-    holds them.
+    holds them, and textures without mip maps.
     """
     objects, found = placement.check(name, scene)
-    scene = in_float32(scene)
+    whole, scene = scene, without_mip_maps(in_float32(scene))
     plan = plan_pictures(scene, effort)
+    if scene.materials != whole.materials:
+        plan.left_out["mip maps"] = "Mitsuba's bitmap has none; these textures are drawn with the filter linear"
+        job.say(f"{name}: mip maps are not judged: {plan.left_out['mip maps']}")
+    if plan.fault is not None:
+        job.say(f"{name}: pictures are not judged: {plan.fault}")
     record: dict[str, Any] = {
         "name": name,
         "shows": shows,
@@ -134,19 +139,19 @@ def _timed(make: Callable[[], Any]) -> tuple[Any, float]:
     return make(), time.perf_counter() - began
 
 
-def scenes_of(job: Job) -> list[tuple[str, str, Path, PictureEffort]]:
-    """Names, descriptions, files and efforts of a user's scenes, or else of the suite's own."""
+def scenes_of(job: Job) -> Iterator[tuple[str, str, Scene, PictureEffort]]:
+    """Names, descriptions and efforts of a user's scenes, or else of the suite's own."""
     size, lower = (192, 128) if job.quick else (512, 256)
     if not job.own:
         stems = Counter(path.stem for path in job.scenes)
         names = [path.stem if stems[path.stem] == 1 else str(path) for path in job.scenes]
-        return [
-            (name, str(path), path, PictureEffort(size, lower)) for name, path in zip(names, job.scenes, strict=True)
-        ]
-    return [
-        (case.name, case.shows, case.path, PictureEffort(size, lower if case.every_rung else None))
-        for case in SCENE_CASES
-    ]
+        for name, path in zip(names, job.scenes, strict=True):
+            yield name, str(path), load_scene(path), PictureEffort(size, lower)
+        return
+    for case in SCENE_CASES:
+        yield case.name, case.shows, load_scene(case.path), PictureEffort(size, lower if case.every_rung else None)
+    for row in textured.rows():
+        yield *row, PictureEffort(lower, paths=False)
 
 
 def _check_aovs(
@@ -155,7 +160,8 @@ def _check_aovs(
     """Compare the camera's rays with those of Mitsuba's own sensor, and then their hits, which Mitsuba has ``made``."""
     cameras = [] if mitsuba_camera.can_judge(scene.camera) else [_camera_gate(name, scene.camera, resolution, job)]
     theirs, seconds = made
-    ours = picture(scene, resolution, "bounded", max_depth=0)
+    # Behind holes of masks rays start anew, by the same rule.
+    ours = picture(scene, resolution, "mitsuba", max_depth=0)
     record, found, off = aovs.compare(name, scene, ours, theirs, job.thresholds.aovs)
     if not job.own:
         found = [verdict.primary_gate(f"{name}, AOVs", scene, ours, off)]

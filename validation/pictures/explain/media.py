@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.diagnostics.ray_step import steps_of
-from renderer.materials.mirror import Mirror
+from renderer.materials.base import appearance_of
 from renderer.materials.registry import Material
 from renderer.picture.prepare import PreparedScene
 from renderer.scene.scene import Scene
@@ -137,7 +137,8 @@ class MediaJudge:
         instance = int(self._owner[face])
         name = self._scene.instances[instance].material
         material = self._scene.materials[name]
-        return _Body(instance, 1.0 if isinstance(material, Mirror) else float(material.ior), name)
+        look = appearance_of(material)
+        return _Body(instance, 1.0 if look.blends else look.ior, name)
 
     def _around(self, eye: NDArray[np.float64]) -> tuple[_Body, ...]:
         """The closed glass around the eye, the largest first."""

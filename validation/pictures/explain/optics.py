@@ -4,9 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from renderer.materials.base import appearance_of
 from renderer.materials.dielectric import Dielectric
 from renderer.materials.registry import Material
-from validation.references.ray_tree import Node, Vector
+from validation.references.ray_tree import Kind, Node, Vector
 
 # The textbook's formula for refraction loses digits near the critical angle, and is not compared within this of it.
 _CRITICAL = 1e-6
@@ -15,7 +16,9 @@ _NEAR = 1e-9
 
 
 def wrong_rays(node: Node, material: Material) -> Iterator[str]:
-    """The rays that leave a surface of a material otherwise than the laws say."""
+    """The rays that leave a surface of a material otherwise than the laws say; of one with textures all but the shares,
+    which the reference judges.
+    """
     n = -node.shading if float(node.direction @ node.shading) > 0.0 else node.shading
     cosine = -float(node.direction @ n)
     n1, n2 = node.indices or (1.0, 1.0)
@@ -27,9 +30,15 @@ def wrong_rays(node: Node, material: Material) -> Iterator[str]:
     if isinstance(material, Dielectric):
         share = fresnel(cosine, np.sqrt(max(0.0, 1.0 - sine2)), n1, n2) if sine2 < 1.0 else 1.0
         reflected, through = share * reflected, (1.0 - share) * through
+    if not appearance_of(material).is_plain:
+        reflected, through = _share(node, "reflected"), _share(node, "refracted")
     yield from _compared(node, "reflected", node.direction + 2.0 * cosine * n, reflected)
     bent = n1 / n2 * node.direction + (n1 / n2 * cosine - np.sqrt(max(0.0, 1.0 - sine2))) * n
     yield from _compared(node, "refracted", bent, through)
+
+
+def _share(node: Node, kind: Kind) -> Vector:
+    return node.children[kind].share if kind in node.children else np.zeros(3)
 
 
 def fresnel(cos_i: float, cos_t: float, n1: float, n2: float) -> float:

@@ -24,6 +24,11 @@ class Ours:
     max_depth: int
     shadows: bool
 
+    @property
+    def has_masks(self) -> bool:
+        """Whether rays pass through holes of any surface."""
+        return self.steps.arrays.holes
+
     def pixel(self, camera: Camera, resolution: tuple[int, int], row: int, column: int) -> Node:
         """The tree of the ray through a pixel's centre, to the bit as the kernel has it."""
         origin, direction = map(_tuple, camera.rays((column + 0.5, row + 0.5), resolution))
@@ -49,11 +54,22 @@ class Ours:
 
     def first_faces(self, origins: NDArray[np.float64], directions: NDArray[np.float64]) -> NDArray[np.int64]:
         """The faces that rays hit first, -1 for none; the rays start on no surface."""
+        if self.has_masks:
+            found = (self.steps.meet(_free(o, d)) for o, d in zip(origins, directions, strict=True))
+            return np.array([-1 if met is None else met.together.seen.face for met in found], np.int64)
         rays, _ = check_rays(origins, directions, 0.0, np.inf)
         return np.asarray(closest_hits(self.steps.prepared.tree, rays, self.steps.prepared.mesh, 1).face)
 
     def hidden(self, origins: NDArray[np.float64], directions: NDArray[np.float64], length: float) -> NDArray[np.bool_]:
         """Whether rays hit anything within a length."""
+        if self.has_masks:
+            # A ray that ends goes on behind a hole to the same end.
+            t_max, ways = (length, directions) if length == np.inf else (1.0, length * directions)
+            aims = (
+                Aim(0, _tuple(o), _tuple(d), t_max, _tuple(o + d), _WHOLE, np.empty(0))
+                for o, d in zip(origins, ways, strict=True)
+            )
+            return np.array([self._arriving(aim)[1] >= 0 for aim in aims])
         rays, _ = check_rays(origins, directions, 0.0, length)
         return np.asarray(closest_hits(self.steps.prepared.tree, rays, self.steps.prepared.mesh, 1).hit)
 
@@ -63,14 +79,23 @@ class Ours:
         if met is None:
             return node
         for aim in self.steps.aims(ray, met):
-            node.shadows[aim.light] = _shadow(aim, hidden=False)
+            shadow = node.shadows[aim.light] = _shadow(aim, hidden=False)
             if self.shadows:
-                hits = self.steps.closest(aim.origin, aim.direction, aim.t_max, aim.start)
-                node.shadows[aim.light].hidden, node.shadows[aim.light].face = bool(hits.hit[0]), int(hits.face[0])
+                shadow.radiance, shadow.face = self._arriving(aim)
+                shadow.hidden = shadow.face >= 0
         if ray.depth < self.max_depth:
             for child in self._children(ray, met):
                 node.children[child.kind] = self._follow(child._replace(weight=_WHOLE), np.array(child.weight))
         return node
+
+    def _arriving(self, aim: Aim) -> tuple[Vector, int]:
+        """The radiance that a shadow ray brings, and the face that hides it, or -1."""
+        while True:
+            hits = self.steps.closest(aim.origin, aim.direction, aim.t_max, aim.start)
+            rest = self.steps.pass_through(aim, hits) if hits.hit[0] else None
+            if rest is None:
+                return np.array(aim.radiance), int(hits.face[0])
+            aim = rest
 
     def _children(self, ray: Ray, met: SurfaceHit) -> list[Ray]:
         return [child for child in self.steps.bounce(ray, met) if max(child.weight) > 0.0]
@@ -100,7 +125,11 @@ class Ours:
 
 def _ray(node: Node) -> Ray:
     """The ray of a node, which starts on no surface and is in no medium."""
-    return Ray(node.kind, node.depth, _tuple(node.origin), _tuple(node.direction), _WHOLE, (), 0.0, np.empty(0))
+    return _free(node.origin, node.direction)._replace(kind=node.kind, depth=node.depth)
+
+
+def _free(origin: Vector, direction: Vector) -> Ray:
+    return Ray("camera", 0, _tuple(origin), _tuple(direction), _WHOLE, (), 0.0, np.empty(0))
 
 
 def _node(ray: Ray, share: Vector | None = None) -> Node:

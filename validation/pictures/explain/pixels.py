@@ -111,7 +111,7 @@ class Explainer:
 
     def explains_primary(self, image: Image, row: int, column: int) -> bool:
         """Whether the first hit of a pixel is as the picture has it, and Mitsuba's but for rounding."""
-        hit = self._tree("own", row, column)
+        hit = self._tree("matched", row, column)
         same = hit.face == image.face[row, column] and hit.t == image.depth[row, column]
         shading = hit.face < 0 or np.abs(hit.shading - image.normal[row, column]).max() <= STORED
         return bool(same and shading) and not compare(self._their_tree(row, column), self._ours["matched"]).faults
@@ -122,8 +122,7 @@ class Explainer:
     ) -> list[Pixel]:  # fmt: skip
         pairs = [(self._tree(rule, row, column), self._their_tree(row, column)) for row, column in pixels]
         parted = [partings(*pair) for pair in pairs]
-        # Exact arithmetic turns the mesh into whole numbers once for all.
-        judged = iter(exactly.wrong(list(chain.from_iterable(parted)), *self._mesh))
+        judged = iter(self._wrong(list(chain.from_iterable(parted))))
         found = []
         for (row, column), pair, places in zip(pixels, pairs, parted, strict=True):
             wrong = [place for place in places if next(judged)]
@@ -136,6 +135,13 @@ class Explainer:
                 reason, said = self._reason(rule, row, column, pair[1], places)
             found.append(Pixel(row, column, reason, [*said, *map(_parted, places)], pair))
         return found
+
+    def _wrong(self, places: list[Parting]) -> list[bool]:
+        """Whether our ray at each parting has a hit that it cannot have. Exact arithmetic knows no masks."""
+        if self._ours["own"].has_masks:
+            return [False] * len(places)
+        # Exact arithmetic turns the mesh into whole numbers once for all.
+        return exactly.wrong(places, *self._mesh)
 
     def _tree(self, rule: Rule, row: int, column: int) -> Node:
         return self._ours[rule].pixel(self._scene.camera, self._resolution, row, column)
@@ -179,7 +185,7 @@ class Explainer:
 
     def _is_theirs(self, fault: Fault, node: Node) -> bool:
         """Whether exact arithmetic gives our hit for their ray, which float32 holds exactly."""
-        if fault.quantity != "face":
+        if fault.quantity != "face" or self._ours["own"].has_masks:
             return False
         (hit,) = exact.closest_hits(*self._mesh, node.origin[None], node.direction[None])
         return fault.ours == -1 if hit is None else fault.ours in hit.faces_at_t

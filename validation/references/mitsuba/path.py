@@ -20,6 +20,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.materials.base import appearance_of
 from renderer.materials.dielectric import Dielectric
 from renderer.scene.scene import Scene
 from validation.references.mitsuba import ambient, phong
@@ -54,6 +55,8 @@ def _first_fault(scene: Scene, glass: str | None) -> str | None:
         material, fault = scene.materials[name], None
         if isinstance(material, Dielectric):
             fault = glass
+        elif not appearance_of(material).is_plain:
+            fault = "the recursion alone judges textures, masks, colours of vertices and emission"
         elif material.passes_light:
             fault = "Mitsuba has no surface that transmits a constant share"
         if fault is not None:

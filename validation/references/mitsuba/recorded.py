@@ -29,7 +29,7 @@ class _Recorded(Recursion):
         if si.is_valid():
             node.face, node.t = self.first[si.shape] + int(si.prim_index), float(si.t) * self.lengths[-1]
             node.point, node.normal, node.shading = _vector(si.p), _vector(si.n), _vector(si.sh_frame.n)
-            node.own = _vector(self.surfaces[si.shape].ambient)
+            node.own = _vector(self.surface(si).own)
         else:
             node.own = _vector(self.background.eval(si))
         return super().leaving(si, depth)

@@ -15,6 +15,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.materials.appearance import Appearance
+from renderer.materials.base import appearance_of
 from renderer.mesh.mesh import Mesh
 from renderer.scene.camera import primary_rays
 from renderer.scene.filters import film_samples
@@ -57,12 +59,12 @@ def mitsuba_rays(rays: Rays) -> list[mi.Ray3f]:
 
 def diffuse(albedo: Rgb) -> mi.BSDF:
     """Lambert's law on both sides of the surface."""
-    return _two_sided({"type": "diffuse", "reflectance": _reflectance(albedo)})
+    return _two_sided({"type": "diffuse", "reflectance": spectrum(albedo)})
 
 
 def mirror(reflectance: Rgb) -> mi.BSDF:
     """A perfect mirror on both sides of the surface."""
-    return _two_sided({"type": "conductor", "material": "none", "specular_reflectance": _reflectance(reflectance)})
+    return _two_sided({"type": "conductor", "material": "none", "specular_reflectance": spectrum(reflectance)})
 
 
 def dielectric(ior: float, reflectance: Rgb, transmittance: Rgb) -> mi.BSDF:
@@ -72,8 +74,8 @@ def dielectric(ior: float, reflectance: Rgb, transmittance: Rgb) -> mi.BSDF:
             "type": "dielectric",
             "int_ior": ior,
             "ext_ior": 1.0,
-            "specular_reflectance": _reflectance(reflectance),
-            "specular_transmittance": _reflectance(transmittance),
+            "specular_reflectance": spectrum(reflectance),
+            "specular_transmittance": spectrum(transmittance),
         }
     )
 
@@ -119,12 +121,17 @@ def _from_y_up(up: str) -> mi.ScalarTransform4f:
 def meshes(scene: Scene, bsdfs: Sequence[mi.BSDF]) -> dict[mi.Mesh, int]:
     """One Mitsuba mesh for each instance that has faces, with the instance's index.
 
+    It has the texture coordinates and the colours of vertices, ``vertex_color``, that the instance's material reads.
+
     bsdfs : one for each of ``scene.instances``.
 
     Raises ``ValueError`` for a mesh whose shape does not survive float32, see ``VERTEX_ROUNDING``.
     """
     placed = zip(scene.instances, bsdfs, strict=True)
-    return {_mesh(i, instance, bsdf): i for i, (instance, bsdf) in enumerate(placed) if len(instance.mesh.faces)}
+    looks = [appearance_of(scene.materials[instance.material]) for instance in scene.instances]
+    return {
+        _mesh(i, instance, bsdf, looks[i]): i for i, (instance, bsdf) in enumerate(placed) if len(instance.mesh.faces)
+    }
 
 
 def in_float32(scene: Scene) -> Scene:
@@ -164,7 +171,7 @@ def _two_sided(bsdf: dict[str, Any]) -> mi.BSDF:
     return mi.load_dict({"type": "twosided", "bsdf": bsdf})
 
 
-def _reflectance(color: Rgb) -> dict[str, Any]:
+def spectrum(color: Rgb) -> dict[str, Any]:
     """A spectrum of ``color`` that may exceed 1, as in our materials; the usual "rgb" may not."""
     return {"type": "srgb", "color": list(color), "unbounded": True}
 
@@ -173,7 +180,7 @@ def _radiance(color: Rgb, scale: float) -> dict[str, Any]:
     return {"type": "rgb", "value": [scale * channel for channel in color]}
 
 
-def _mesh(index: int, instance: Instance, bsdf: mi.BSDF) -> mi.Mesh:
+def _mesh(index: int, instance: Instance, bsdf: mi.BSDF, look: Appearance) -> mi.Mesh:
     mesh = instance.mesh
     vertices = mesh.vertices.astype(np.float32)
     moved = np.abs(vertices - mesh.vertices).max()
@@ -185,8 +192,21 @@ def _mesh(index: int, instance: Instance, bsdf: mi.BSDF) -> mi.Mesh:
     properties = mi.Properties()
     properties["bsdf"] = bsdf
     name, counts = f"instance{index}", (len(vertices), len(mesh.faces))
-    result = mi.Mesh(name, *counts, has_vertex_normals=instance.smooth, props=properties)
-    return fill(result, vertices, mesh.faces, instance.normals if instance.smooth else None)
+    mapped = len(look.textures) > 0
+    result = mi.Mesh(name, *counts, has_vertex_normals=instance.smooth, has_vertex_texcoords=mapped, props=properties)
+    if mapped:
+        mi.traverse(result)["vertex_texcoords"] = np.asarray(mesh.texcoords, np.float32).ravel()
+    fill(result, vertices, mesh.faces, instance.normals if instance.smooth else None)
+    if look.vertex_colors is not None:
+        result.add_attribute("vertex_color", 3, linear(mesh.colors, is_srgb=look.vertex_colors == "srgb").ravel())
+    return result
+
+
+def linear(colors: NDArray[np.floating] | None, *, is_srgb: bool) -> NDArray[np.float32]:
+    """Colours (n, 3) as Mitsuba's bitmap converts them to linear ones."""
+    bitmap = mi.Bitmap(np.array(colors, np.float32)[None])
+    bitmap.set_srgb_gamma(is_srgb)
+    return np.array(bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))[0]
 
 
 def fill(mesh: mi.Mesh, vertices: NDArray[Any], faces: NDArray[Any], normals: NDArray[Any] | None = None) -> mi.Mesh:

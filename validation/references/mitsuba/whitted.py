@@ -8,18 +8,21 @@ gives the same bits.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from math import pi
 
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.materials.appearance import Appearance
+from renderer.materials.base import appearance_of
 from renderer.materials.dielectric import Dielectric
 from renderer.materials.mirror import Mirror
-from renderer.materials.phong import Phong
 from renderer.materials.registry import Material
 from renderer.scene.scene import Scene
 from validation.references.mitsuba import scene as mitsuba_scene
+from validation.references.mitsuba import textures
 
 # Delta lobes and delta emitters do not depend on the random numbers.
 _ANY_NUMBER, _ANY_POINT = 0.5, mi.Point2f(0.5, 0.5)
@@ -51,10 +54,10 @@ class Lobe:
 
 @dataclass(frozen=True)
 class Surface:
-    """One material's surface: ambient light k_a I_a, the BSDF and highlight that scatter the lights, and the lobes."""
+    """A surface: what leaves it without lights, k_a I_a and emission, what scatters the lights, and the lobes."""
 
-    ambient: mi.Color3f
-    diffuse: mi.BSDF | None
+    own: mi.Color3f
+    diffuse: mi.Color3f | None
     specular: mi.Color3f | None
     shininess: float
     lobes: tuple[Lobe, ...]
@@ -64,20 +67,42 @@ class Surface:
 class Recursion:
     scene: mi.Scene
     surfaces: dict[mi.Mesh, Surface]
+    maps: dict[mi.Mesh, textures.Maps]
     lights: tuple[mi.Emitter, ...]
+    ambient: mitsuba_scene.Rgb
     background: mi.Emitter
     max_depth: int
     shadows: bool
 
     def radiance(self, ray: mi.Ray3f, depth: int) -> mi.Color3f:
-        return self.leaving(self.scene.ray_intersect(ray), depth)
+        return self.leaving(self.hit(ray), depth)
+
+    def hit(self, ray: mi.Ray3f) -> mi.SurfaceInteraction3f:
+        """The first hit that no mask leaves out, with the shading normal of a map."""
+        si, before = self.scene.ray_intersect(ray), 0.0
+        while si.is_valid() and not self.is_there(si):
+            before += si.t
+            si = self.scene.ray_intersect(si.spawn_ray(ray.d))
+        if si.is_valid() and si.shape in self.maps:
+            self.maps[si.shape].turn(si, ray.d)
+        si.t += before
+        return si
+
+    def is_there(self, si: mi.SurfaceInteraction3f) -> bool:
+        """Whether no mask leaves out the surface at a hit."""
+        return si.shape not in self.maps or self.maps[si.shape].is_there(si)
+
+    def surface(self, si: mi.SurfaceInteraction3f) -> Surface:
+        """The surface at a hit."""
+        maps = self.maps.get(si.shape)
+        return self.surfaces[si.shape] if maps is None else _phong(maps.at(si), self.ambient)
 
     def leaving(self, si: mi.SurfaceInteraction3f, depth: int) -> mi.Color3f:
         """The radiance that leaves what a ray hit, against the ray."""
         if not si.is_valid():
             return self.background.eval(si)
-        surface = self.surfaces[si.shape]
-        result = surface.ambient
+        surface = self.surface(si)
+        result = surface.own
         if surface.diffuse is not None or surface.specular is not None:
             for light in range(len(self.lights)):
                 result = result + self.lit(si, surface, light)
@@ -94,8 +119,14 @@ class Recursion:
         return irradiance * scattered(si, surface, wo)
 
     def hides(self, si: mi.SurfaceInteraction3f, sample: mi.DirectionSample3f) -> bool:
-        """Whether a surface hides the light that was sampled."""
-        return self.shadows and self.scene.ray_test(si.spawn_ray_to(sample.p))
+        """Whether a surface hides the light that was sampled; through holes of masks it shines."""
+        if not (self.shadows and self.scene.ray_test(si.spawn_ray_to(sample.p))):
+            return False
+        while si.is_valid():
+            si = self.scene.ray_intersect(si.spawn_ray_to(sample.p))
+            if si.is_valid() and self.is_there(si):
+                return True
+        return False
 
     def follow(self, si: mi.SurfaceInteraction3f, lobe: Lobe, depth: int) -> mi.Color3f:
         sample, weight = lobe.bsdf.sample(lobe.context, si, _ANY_NUMBER, _ANY_POINT)
@@ -116,7 +147,7 @@ def scattered(si: mi.SurfaceInteraction3f, surface: Surface, wo: mi.Vector3f) ->
     """
     result = mi.Color3f(0.0)
     if surface.diffuse is not None:
-        result = result + surface.diffuse.eval(_ALL, si, wo)
+        result = result + surface.diffuse * _white().eval(_ALL, si, wo)
     if surface.specular is not None:
         cosine = float(sum(mi.reflect(wo) * si.wi))
         if cosine > 0.0:
@@ -131,25 +162,44 @@ def _surface(material: Material, ambient_light: mitsuba_scene.Rgb) -> Surface:
     if isinstance(material, Dielectric):
         glass = mitsuba_scene.dielectric(material.ior, material.reflectance, material.transmittance)
         return Surface(black, None, None, 0.0, (Lobe(glass, _REFLECTION), Lobe(glass, REFRACTION)))
-    ambient = material.diffuse if material.ambient is None else material.ambient
+    return _phong(appearance_of(material), ambient_light)
+
+
+def _phong(look: Appearance, ambient_light: mitsuba_scene.Rgb) -> Surface:
     return Surface(
-        mi.Color3f(*ambient) * mi.Color3f(*ambient_light),
-        mitsuba_scene.diffuse(material.diffuse) if any(material.diffuse) else None,
-        mi.Color3f(*material.specular) if any(material.specular) else None,
-        material.shininess,
-        _phong_lobes(material),
+        mi.Color3f(*look.ambient) * mi.Color3f(*ambient_light) + mi.Color3f(*look.emission),
+        mi.Color3f(*look.diffuse) if any(look.diffuse) else None,
+        mi.Color3f(*look.specular) if any(look.specular) else None,
+        look.shininess,
+        _phong_lobes(look),
     )
 
 
-def _phong_lobes(material: Phong) -> tuple[Lobe, ...]:
+def _phong_lobes(look: Appearance) -> tuple[Lobe, ...]:
     """The constant shares; clear glass gives the refracted direction, and weight 0 under total internal reflection."""
     lobes = []
-    if any(material.reflectance):
-        lobes.append(Lobe(mitsuba_scene.mirror(material.reflectance), _ALL))
-    if any(material.transmittance):
-        glass = mitsuba_scene.dielectric(material.ior, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
-        lobes.append(Lobe(glass, REFRACTION, mi.Color3f(*material.transmittance)))
+    if any(look.reflectance):
+        lobes.append(Lobe(_white_mirror(), _ALL, mi.Color3f(*look.reflectance)))
+    if any(look.transmittance):
+        # What blends is not bent.
+        glass = _clear_glass(1.0 if look.blends else look.ior)
+        lobes.append(Lobe(glass, REFRACTION, mi.Color3f(*look.transmittance)))
     return tuple(lobes)
+
+
+@cache
+def _white() -> mi.BSDF:
+    return mitsuba_scene.diffuse((1.0, 1.0, 1.0))
+
+
+@cache
+def _white_mirror() -> mi.BSDF:
+    return mitsuba_scene.mirror((1.0, 1.0, 1.0))
+
+
+@cache
+def _clear_glass(ior: float) -> mi.BSDF:
+    return mitsuba_scene.dielectric(ior, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
 
 
 def recursion_of(
@@ -160,10 +210,14 @@ def recursion_of(
     # Mitsuba requires a BSDF for each shape, but only the surfaces' own lobes are sampled, so any will do.
     shapes = mitsuba_scene.meshes(scene, [mitsuba_scene.diffuse((0.0, 0.0, 0.0))] * len(surfaces))
     lights = tuple(mitsuba_scene.emitter(light) for light in scene.all_lights)
+    maps = {name: textures.maps_of(scene.materials[name]) for name in {i.material for i in scene.instances}}
+    of_shapes = {shape: maps[scene.instances[index].material] for shape, index in shapes.items()}
     recursion = kind(
         mitsuba_scene.assemble(shapes, lights),
         {shape: surfaces[index] for shape, index in shapes.items()},
+        {shape: found for shape, found in of_shapes.items() if found is not None},
         lights,
+        scene.ambient,
         mitsuba_scene.background(scene),
         max_depth,
         scene.render.shadows,
@@ -179,7 +233,7 @@ def can_judge(scene: Scene) -> str | None:
         mitsuba_scene.meshes(scene, [mitsuba_scene.diffuse((0.0, 0.0, 0.0))] * len(scene.instances))
     except ValueError as error:
         return str(error)
-    return None
+    return textures.can_judge(scene)
 
 
 def whitted(
@@ -192,14 +246,14 @@ def whitted(
     rays: mitsuba_scene.Rays | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> NDArray[np.float64]:
-    """The picture of ``scene`` by reference B, linear radiance (height, width, 3) float64.
+    """The picture of ``scene`` by reference B, linear radiance (height, width, 3) float64, without mip maps.
 
     max_depth : bounces followed, as in ``RenderSettings``; there is no ``min_weight``.
     samples : a square number of rays a pixel, on our regular grid.
     rays : origins and unit directions, (height * width, 3) each, instead of the camera's; ``samples`` is then unused.
     progress : called with the number of finished rows and of all rows.
     """
-    tracer, _ = recursion_of(scene, max_depth)
+    tracer, _ = recursion_of(textures.without_mip_maps(scene), max_depth)
     bundles = mitsuba_scene.camera_rays(scene, width, height, samples) if rays is None else [rays]
     weights = mitsuba_scene.camera_weights(scene, bundles)
     result = np.zeros((height, width, 3))
@@ -232,16 +286,17 @@ class Aovs:
 
 def aovs(scene: Scene, width: int, height: int, *, rays: mitsuba_scene.Rays | None = None) -> Aovs:
     """Mitsuba's float32 hits of our primary rays through the pixels' centres, or of ``rays``."""
-    shapes = mitsuba_scene.meshes(scene, [mitsuba_scene.diffuse((0.0, 0.0, 0.0))] * len(scene.instances))
-    unlit = mitsuba_scene.assemble(shapes, [])
+    tracer, shapes = recursion_of(scene, 0)
     table = np.full((height * width, 10), np.nan)
     table[:, 0] = np.inf
     instance = np.full(height * width, -1, dtype=np.int64)
     bundle = mitsuba_scene.camera_rays(scene, width, height, 1)[0] if rays is None else rays
     for row, ray in enumerate(mitsuba_scene.mitsuba_rays(bundle)):
-        si = unlit.ray_intersect(ray)
+        si = tracer.hit(ray)
         if si.is_valid():
-            table[row] = si.t, *si.p, *si.n, *si.sh_frame.n
+            # Behind a hole of a mask a ray is beside its line by an offset.
+            place = ray(si.t) if tracer.maps else si.p
+            table[row] = si.t, *place, *si.n, *si.sh_frame.n
             instance[row] = shapes[si.shape]
     vectors = table[:, 1:].reshape(height, width, 3, 3)
     return Aovs(
