@@ -46,6 +46,8 @@ from validation.promises.pictures import (
     refraction,
     saved,
     shining,
+    surfaces,
+    textures,
 )
 from validation.promises.row import row
 
@@ -77,6 +79,8 @@ CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "nesting": nesting.check_nesting,
     "shining": shining.check_shining,
     "images": lambda: images.check_images(np.random.default_rng(5)),
+    "textures": lambda: textures.check_textures(np.random.default_rng(5)),
+    "surfaces": lambda: surfaces.check_surfaces(np.random.default_rng(5)),
     "refraction": lambda: refraction.check_refraction(np.random.default_rng(5), 100),
 }
 
