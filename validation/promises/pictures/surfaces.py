@@ -6,6 +6,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from renderer.materials.dielectric import Dielectric
+from renderer.materials.mirror import Mirror
 from renderer.materials.phong import Phong
 from renderer.mesh.texture import Texture
 from renderer.scene.camera import PerspectiveCamera
@@ -46,6 +48,7 @@ def check_surfaces(rng: Generator) -> list[dict[str, Any]]:
         row("a surface that is partly there lets the rest through unbent", _BY, _blended(rng)),
         row("a surface that is partly there shades by its share where shadows are clear", _BY, _shaded()),
         row("emission is seen in mirrors, and lights nothing else", _BY, _emitted()),
+        row("a material receives light where a lamp changes its look", "a picture without lamps", _received()),
     ]
 
 
@@ -188,3 +191,11 @@ def _emitted() -> Bools:
     for floor, share in ((Phong(diffuse=BLACK, reflectance=0.5), 0.5), (Phong(diffuse=1.0), 0.0)):
         kept.append(close(seen((sheet(), floor), lamp, size=2, eye=1.0), share * shine))
     return np.concatenate(kept)
+
+
+def _received() -> Bools:
+    """Materials that scatter, shine, glow, mirror and refract."""
+    materials = Phong(), Phong(diffuse=0.0, specular=0.5), Phong(diffuse=0.0, ambient=1.0), Mirror(), Dielectric()
+    found = [[seen((sheet(), each), size=1, ambient=1.0, lights=some) for some in ((), (_SUN,))] for each in materials]
+    changed = [not np.array_equal(bare, lit) for bare, lit in found]
+    return np.array([each.receives_light == lit for each, lit in zip(materials, changed, strict=True)])

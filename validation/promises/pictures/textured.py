@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.materials.phong import Phong
+from renderer.materials.registry import Material
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.texture import Texture
 from renderer.scene.scene import Scene
@@ -30,7 +31,7 @@ def pixels(size: int) -> tuple[Floats, Floats]:
     return x, y
 
 
-def seen(*layers: tuple[Mesh, Phong], size: int, eye: float = 9.0, **given: Any) -> NDArray[np.float32]:
+def seen(*layers: tuple[Mesh, Material], size: int, eye: float = 9.0, **given: Any) -> NDArray[np.float32]:
     """The radiance of sheets with their materials, from above in parallel rays unless another ``camera`` is given."""
     materials = {str(k): material for k, (_, material) in enumerate(layers)}
     objects = tuple(thing(mesh, str(k)) for k, (mesh, _) in enumerate(layers))
