@@ -100,7 +100,7 @@ def _tinted(rng: Generator) -> Bools:
 
 
 def _normals(rng: Generator) -> Bools:
-    """Coordinates along x and y, mirrored along either, exchanged, and skewed: by the gradients of u and v."""
+    """Coordinates along x and y, mirrored along either, exchanged and turned: by the gradients of u and v."""
     kept = []
     for rows in ([[1, 0], [0, 1]], [[-1, 0], [0, 1]], [[1, 0], [0, -1]], [[0, 1], [1, 0]], [[0, -1], [1, 0]]):
         matrix = np.array(rows, np.float64)

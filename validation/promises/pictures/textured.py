@@ -39,14 +39,14 @@ def seen(*layers: tuple[Mesh, Material], size: int, eye: float = 9.0, **given: A
     return shown(Scene(materials=materials, objects=objects, **view), (size, size))
 
 
-def screen(texture: Any, **given: Any) -> Phong:
+def screen(texture: Texture) -> Phong:
     """A material that shows a texture as it is."""
-    return Phong(diffuse=0.0, emission_map=texture, **given)
+    return Phong(diffuse=0.0, emission_map=texture)
 
 
-def even(color: Any, **given: Any) -> Texture:
+def even(color: Any) -> Texture:
     """A texture of one linear value."""
-    return Texture(np.array([[color]], np.float32), **given)
+    return Texture(np.array([[color]], np.float32))
 
 
 def close(found: NDArray[np.float32], expected: Any) -> NDArray[np.bool_]:
