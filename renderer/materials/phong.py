@@ -162,6 +162,7 @@ class Phong(BaseMaterial):
         """The textures that there are; that of ambient light is the one of diffuse light, as is its colour."""
         named = {name: getattr(self, name) for name in _MAPS}
         if self.ambient is None:
+            # rule: ambient-by-diffuse-map
             named["ambient_map"] = self.diffuse_map
         return {name: texture for name, texture in named.items() if texture is not None}
 

@@ -49,6 +49,7 @@ class Materials:
         transmission = extensions.get("KHR_materials_transmission") or {}
         if unread:
             self._reading.note("left out of materials:", unread)
+        # rule: emissive-strength
         strength = (extensions.get("KHR_materials_emissive_strength") or {}).get("emissiveStrength", 1.0)
         rough = entry.get("pbrMetallicRoughness") or {}
         red, green, blue, alpha = rough.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))

@@ -110,6 +110,7 @@ class Texture:
             raise MeshError(str(error)) from None
         a, b = (np.array(color, np.float32) for color in colors)
         # The first row of an image is the upper one.
+        # rule: checker
         return cls(np.array([[b, a], [a, b]]), ((across / 2, 0, 0), (0, down / 2, 0)), filter="nearest")
 
 

@@ -68,6 +68,7 @@ def _row(look: Appearance, number: Any) -> NDArray[np.float64]:
         row[k] = number(look.textures.get(name), True)
     row[EMISSION : EMISSION + 3] = look.emission
     for column, name in ((NORMAL_MAP, "normal_map"), (OPACITY_MAP, "opacity_map")):
+        # rule: maps-of-data
         row[column] = number(look.textures.get(name), False)
     row[OPACITY], row[CUTOFF] = look.opacity, look.cutoff
     row[TINTED], row[MAPPED] = look.vertex_colors is not None, bool(look.textures)
@@ -90,6 +91,7 @@ class _Images:
 
     def placed(self, image: TextureImage, is_color: bool, filter: str) -> tuple[int, tuple[int, int], int]:
         """The place of an image's first texel, its size, and how many levels it has."""
+        # rule: floats-are-linear
         key = (image, is_color and image.pixels.dtype.kind == "u", filter == "mipmap")
         if key not in self._placed:
             levels = list(_pyramid(_linear(image.pixels, key[1]), key[2]))
@@ -110,10 +112,12 @@ def _linear(pixels: NDArray[Any], is_srgb: bool) -> NDArray[np.float32]:
     alpha = channels in (2, 4)
     most = 1.0 if pixels.dtype.kind == "f" else float(np.iinfo(pixels.dtype).max)
     colors = pixels[..., : channels - alpha] / np.float64(most)
+    # rule: linear-of-srgb
     if is_srgb:
         colors = linear_of_srgb(colors)
     found[..., :3] = colors
     if alpha:
+        # rule: alpha-of-image
         found[..., 3] = pixels[..., -1] / most
     elif channels == 1:
         # A grey image may be the opacity itself.
@@ -124,6 +128,7 @@ def _linear(pixels: NDArray[Any], is_srgb: bool) -> NDArray[np.float32]:
 def linear_of_srgb(encoded: NDArray[Any]) -> NDArray[np.float64]:
     """Linear values of sRGB values from 0 to 1 (IEC 61966-2-1)."""
     low: NDArray[np.float64] = encoded / 12.92
+    # rule: toe-of-srgb
     return np.where(encoded <= 0.04045, low, ((encoded + 0.055) / 1.055) ** 2.4)
 
 
@@ -134,6 +139,7 @@ def _pyramid(level: NDArray[np.float32], whole: bool) -> Iterator[NDArray[np.flo
     yield level
     while whole and max(level.shape[:2]) > 1:
         size = max(level.shape[1] // 2, 1), max(level.shape[0] // 2, 1)
+        # rule: mean-of-texels
         channels = [Pillow.fromarray(level[..., k]).resize(size, Pillow.Resampling.BOX) for k in range(4)]
         level = np.stack([np.asarray(channel) for channel in channels], axis=2)
         yield level
@@ -162,4 +168,5 @@ def tints_of(instance: Instance, mesh: Mesh, look: Appearance) -> NDArray[np.flo
     whose = f"mesh {mesh.name!r} of material {instance.material!r}"
     expect(mesh.colors is not None, whose, "colours of vertices for its vertex_colors", "none")
     colors = np.asarray(mesh.colors, np.float64)
+    # rule: space-of-vertex-colours
     return linear_of_srgb(colors) if space == "srgb" else colors

@@ -143,6 +143,7 @@ def material_of(own: MeshMaterial, colors: Space | None = None) -> Material:
     """
     shared: dict[str, Any] = {"normal_map": own.normal_texture, "vertex_colors": colors, **_opacity(own)}
     base, texture = own.base_color, own.base_color_texture
+    # rule: unlit-file
     if own.unlit:
         return Phong(diffuse=0.0, emission=base, emission_map=texture, **shared)
     metallic = own.metallic * _mean(own.metallic_roughness_texture, 2)
@@ -150,6 +151,7 @@ def material_of(own: MeshMaterial, colors: Space | None = None) -> Material:
     through = own.transmission * _mean(own.transmission_texture, 0)
     if through >= 0.5:
         return Dielectric(ior=own.ior, transmittance=np.multiply(own.transmission_color, through))
+    # rule: mirrored-by-metal
     straight = _STRAIGHT * (1.0 - metallic) + np.multiply(base, metallic * (1.0 - roughness))
     # Highlights of metal have the colours of its texture; others are white.
     of_metal = texture if metallic >= 0.5 else None
@@ -188,8 +190,10 @@ def _mean(texture: Texture | None, channel: int) -> float:
 
 def _opacity(own: MeshMaterial) -> dict[str, Any]:
     """The fields of opacity by the mode of a file's alpha."""
+    # rule: opaque-file
     if own.alpha_mode == "opaque" or (own.alpha_mode == "mask" and own.alpha_cutoff == 0.0):
         return {}
+    # rule: cutoff-of-file
     cutoff = own.alpha_cutoff if own.alpha_mode == "mask" else 0.0
     return {"opacity": own.alpha, "cutoff": cutoff, "opacity_map": _alpha_map(own)}
 

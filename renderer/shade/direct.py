@@ -144,6 +144,7 @@ def _pass_through(tree, scene, scratch, k, rule):
         spot = Spot(load(found.face, 0), load(found.u, 0), load(found.v, 0))
         if rays == MOST_PANES:
             return True, rays
+        # rule: holes-in-shadows
         if scene.looks.is_there(scene, spot):
             through = _share_through(scene, scratch, spot, d)
             # rule: clear-shadows

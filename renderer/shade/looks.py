@@ -142,6 +142,7 @@ def _rgb(lanes):
 @inlined
 def _opacity(scene, maps, patch):
     opacity, texture = load(scene.maps, maps + OPACITY), load(scene.maps, maps + OPACITY_MAP)
+    # rule: alpha-of-opacity-map
     return (
         opacity * extract(texture_at(scene.textures, scene.texels, int(texture), patch), 3)
         if texture >= 0.0
@@ -160,13 +161,16 @@ def _own_row(scene, spot, look, d, width, own):
         patch = _patch_at(scene, at, spot.u, spot.v, d, width, look.facet)
         _put_mapped(scene, maps, patch, own)
         opacity = _opacity(scene, maps, patch)
+    # rule: colours-of-vertices
     if load(scene.maps, maps + TINTED) != 0.0:
         a, b, c = scene.ways.tints(scene, at)
         for k in _TINTED:
             put3(own, k, times(three(own, k), barycentric(a, b, c, spot.u, spot.v)))
     if opacity < 1.0 and load(scene.maps, maps + CUTOFF) == 0.0:
         for k in OWN_COLORS:
+            # rule: share-of-blend
             put3(own, k, scale(three(own, k), opacity))
+        # rule: rest-of-blend
         rest = 1.0 - opacity
         put3(own, TRANSMITTANCE, add(three(own, TRANSMITTANCE), (rest, rest, rest)))
     return doubles_between(scene.materials, own)
@@ -182,6 +186,7 @@ def _put_mapped(scene, maps, patch, own):
             # Ambient and diffuse light mostly share theirs.
             if texture != last:
                 last, values = texture, texture_at(scene.textures, scene.texels, int(texture), patch)
+            # rule: colour-by-map
             put3(own, OWN_COLORS[k], times(three(own, OWN_COLORS[k]), _rgb(values)))
 
 
@@ -199,7 +204,9 @@ def _mapped_normal(scene, spot, look, d, width):
     r, g, b = _rgb(
         texture_at(scene.textures, scene.texels, number, _patch_at(scene, at, spot.u, spot.v, d, width, look.facet))
     )
+    # rule: strength-of-normals
     strength = load(scene.textures, number * TEXTURE_COLUMNS + STRENGTH)
+    # rule: normal-of-texel
     x, y, z = strength * (2.0 * r - 1.0), strength * (2.0 * g - 1.0), 2.0 * b - 1.0
     return normalized(add(add(scale(along, x), scale(other, y)), scale(n, z)))
 
@@ -211,17 +218,20 @@ def _tangents(scene, at, n):
     p0, p1, p2 = scene.ways.corners(scene, at)
     e, f = sub(p1, p0), sub(p2, p0)
     turn = (u1 - u0) * (v2 - v0) - (u2 - u0) * (v1 - v0)
+    # rule: tangent-along-u
     along = scale(sub(scale(e, v2 - v0), scale(f, v1 - v0)), 1.0 if turn > 0.0 else -1.0)
     along = sub(along, scale(n, dot(n, along)))
     if turn == 0.0 or length(along) == 0.0:
         return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     along = normalized(along)
     # Where the image is mirrored on the face, v grows to the other side of u.
+    # rule: mirrored-tangents
     return along, scale(cross(n, along), 1.0 if turn > 0.0 else -1.0)
 
 
 @inlined
 def _own_glow(scene, row):
+    # rule: emission
     return add(ambient_light(scene, row), three(scene.materials, row + MATERIAL_COLUMNS))
 
 
@@ -230,6 +240,7 @@ def _is_there(scene, spot):
     at = scene.ways.at(scene, spot.face)
     maps = _maps_of(load(scene.material, scene.ways.row(scene, at)))
     cutoff = load(scene.maps, maps + CUTOFF)
+    # rule: mask-at-cutoff
     return cutoff == 0.0 or _opacity(scene, maps, _here(scene, at, spot.u, spot.v)) >= cutoff
 
 

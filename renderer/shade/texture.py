@@ -80,6 +80,7 @@ def texture_at(textures, texels, texture, patch):
 @inlined
 def _moved(textures, row, u, v):
     at = row + TRANSFORM
+    # rule: moved-texture
     x = (load(textures, at) * u + load(textures, at + 1) * v) + load(textures, at + 2)
     y = (load(textures, at + 3) * u + load(textures, at + 4) * v) + load(textures, at + 5)
     # NaN is beyond too.
@@ -110,7 +111,9 @@ def _mean(texels, wraps, levels, image, middle, along, longer, area):
     """
     whole = not longer < _LONGEST
     # Fewer circles than would fill the ellipse are wider.
+    # rule: mips-along-ellipse
     count = 1 if whole else np.int64(minimum(longer * longer / maximum(area, longer), _MOST_MEANS) + 0.5)
+    # rule: mip-level
     number, share = _level_of(_LONGEST if whole else longer / count, levels)
     # Of several circles each from one level, as their mean is smooth without blending.
     if count > 1:
@@ -156,6 +159,7 @@ def _folded(rule, x):
         return x - np.floor(x)
     if rule == MIRRORED:
         x -= 2.0 * np.floor(0.5 * x)
+        # rule: mirrored-texture
         return 2.0 - x if x > 1.0 else x
     return x
 
@@ -164,6 +168,7 @@ def _folded(rule, x):
 def _wrapped(rule, i, count):
     """The number of the texel that stands for the i-th of a row of ``count``, which is at most one beyond an end."""
     if rule == REPEAT:
+        # rule: repeated-texture
         return i + count if i < 0 else i - count if i >= count else i
     return minimum(maximum(i, np.int64(0)), count - 1)
 
@@ -176,6 +181,7 @@ def _column(wraps, image, i):
 @inlined
 def _line(wraps, image, j):
     # The first row is the upper one; v points up.
+    # rule: row-of-texels
     return (image.high - 1 - _wrapped(wraps[1], j, image.high)) * image.wide
 
 
@@ -196,6 +202,7 @@ def _nearest(texels, wraps, image, x, y):
 @kernel
 def _between_four(texels, wraps, image, x, y):
     """The value at a place from the four texels around it."""
+    # rule: texels-around
     x, y = _place(wraps, image, x, y)
     left, low = np.floor(x - 0.5), np.floor(y - 0.5)
     s, t, i, j = x - 0.5 - left, y - 0.5 - low, np.int64(left), np.int64(low)

@@ -395,6 +395,7 @@ def meet(tree, scene, settings, bundle, scratch):
     starts = StartPointers(bundle.starts, ROW if depth_of(bundle) > 0 else 0, scene.vertices, scene.faces)
     rays = RayPointers(bundle.origins, bundle.directions, scratch.zero, scratch.infinity, 3, 3, 0, 0, 1.0, starts)
     trace_rays(tree, rays, scratch.found, count_of(bundle), scratch.trace, np.bool_(False))
+    # rule: holes-for-rays
     if scene.looks.has_holes(scene):
         _go_through_holes(tree, scene, settings, bundle, scratch)
     _meet_surfaces(tree, scene, bundle, scratch)

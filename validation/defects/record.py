@@ -36,6 +36,7 @@ KEPT = {
     "reflected rays that escape": _REFLECTED,
     "reflected rays that stay in place": _REFLECTED,
     "points whose sky changes when their face is named": "checks all points, of which exact arithmetic judges some",
+    "RMS of mip maps beside many samples": "states the error of the filter, of which closed forms see the exact cases",
     "distance of the slope of log RMSE from -1/2": _PATHS,
     "p-value of the largest z": _PATHS,
 }

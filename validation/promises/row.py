@@ -13,3 +13,8 @@ def row(promise: str, judge: str, kept: NDArray[np.bool_]) -> dict[str, Any]:
     """
     broken = int(np.count_nonzero(~kept)) if kept.size else 1
     return {"promise": promise, "judge": judge, "asked": int(kept.size), "broken": broken}
+
+
+def figure(promise: str, judge: str, quantity: str, value: float, most: float) -> dict[str, Any]:
+    """The row of a promise that a quantity, which becomes that of its gate, is at most so much."""
+    return row(promise, judge, np.array([value <= most])) | {"figure": [quantity, value, most]}

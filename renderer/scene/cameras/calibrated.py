@@ -76,6 +76,7 @@ def opencv_intrinsics(K: ArrayLike) -> Intrinsics:
     shape = matrix.shape == (3, 3) and matrix[1, 0] == 0.0 and matrix[2].tolist() == [0.0, 0.0, 1.0]
     expect(shape, "K", "[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]", repr(matrix.tolist()))
     (fx, skew, cx), (_, fy, cy), _ = matrix.tolist()
+    # rule: opencv-pixels
     return Intrinsics(fx, fy, cx + 0.5, cy + 0.5, skew)
 
 

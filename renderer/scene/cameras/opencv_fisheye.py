@@ -132,6 +132,7 @@ class OpenCVFisheyeCamera(CalibratedCamera, AngularCamera):
     def _distance(self, angle: Floats) -> tuple[Floats, Floats]:
         """How far from the principal point a ray at an angle falls, in focal lengths, and its derivative."""
         square = angle * angle
+        # rule: fisheye-distortion
         powers = (1.0, self.k1, self.k2, self.k3, self.k4)
         return angle * polynomial(powers, square), polynomial(self._slopes(), square)
 

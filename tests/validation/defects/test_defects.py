@@ -108,12 +108,12 @@ class TestSeam:
             inject(Rule("rounded-encoding", value("_")))
 
     def test_kernels_follow_though_the_cache_holds_sound_ones(self, tmp_path: Path) -> None:
-        """The digest of ``shading`` and of what imports it changes; that of ``simd`` does not."""
+        """The digest of ``dielectric`` and of what imports it changes; that of ``simd`` does not."""
         call = (
-            "from renderer.shade.shading import fresnel; from renderer.jit.digest import source_digest\n"
+            "from renderer.materials.dielectric import fresnel; from renderer.jit.digest import source_digest\n"
             "from pathlib import Path; import json\n"
             "digests = [source_digest(Path('renderer').resolve() / f'{m}.py')"
-            " for m in ('shade/shading', 'shade/direct', 'numerics/simd')]\n"
+            " for m in ('materials/dielectric', 'shade/direct', 'numerics/simd')]\n"
             "print(json.dumps([fresnel(1.0, 1.0, 1.0, 1.5), *digests]))"
         )
         alter = (

@@ -11,10 +11,11 @@ from cases import cases
 from renderer.diagnostics import tree_boxes
 from renderer.mesh import obj, polygons
 from renderer.octree import Octree
-from renderer.picture import camera_rays, image, pack, prepare
+from renderer.picture import camera_rays, image, maps, pack, prepare
 from renderer.queryable import Queries
 from renderer.results import hits
-from renderer.scene import filters, scene
+from renderer.scene import file_material, filters, scene
+from renderer.scene.cameras import distortion
 from renderer.trace.layout import Tree
 from validation.promises.hits import (
     alone,
@@ -37,15 +38,19 @@ from validation.promises.pictures import (
     bounces,
     cameras,
     codes,
+    filed,
     floors,
     images,
     nesting,
     openings,
     placing,
+    projections,
     reconstruction,
     refraction,
     saved,
     shining,
+    surfaces,
+    textures,
 )
 from validation.promises.row import row
 
@@ -77,6 +82,10 @@ CHECKS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "nesting": nesting.check_nesting,
     "shining": shining.check_shining,
     "images": lambda: images.check_images(np.random.default_rng(5)),
+    "filed": lambda: filed.check_filed(np.random.default_rng(5)),
+    "projections": lambda: projections.check_projections(np.random.default_rng(5), 20),
+    "textures": lambda: textures.check_textures(np.random.default_rng(5)),
+    "surfaces": lambda: surfaces.check_surfaces(np.random.default_rng(5)),
     "refraction": lambda: refraction.check_refraction(np.random.default_rng(5), 100),
 }
 
@@ -209,6 +218,35 @@ def test_a_light_that_is_left_out_is_found(monkeypatch: pytest.MonkeyPatch) -> N
     sound = pack.light_rows
     monkeypatch.setattr(pack, "light_rows", lambda scene, needs: sound(scene, needs) * ([1.0] * 4 + [1.0, 0.0, 0.0]))
     assert "a light" in broken("shining")
+
+
+def test_images_in_another_space_or_without_alpha_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = maps._linear
+    monkeypatch.setattr(maps, "linear_of_srgb", lambda encoded: encoded)
+    assert broken("textures") == {"integers of"} and broken("surfaces") == {"colours of"}
+    monkeypatch.setattr(maps, "_linear", lambda pixels, is_srgb: sound(pixels[..., :3], is_srgb))
+    assert {"rays pass", "light shines", "a surface"} <= broken("surfaces")
+
+
+def test_mip_maps_that_blur_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(maps._FILTERS, "mipmap", maps.LINEAR)
+    assert broken("textures") == {"a pixel", "one sample"}
+
+
+def test_materials_of_files_of_another_look_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = file_material.material_of
+
+    def other(own: Any, colors: Any = None) -> Any:
+        return sound(replace(own, alpha_mode="opaque", metallic=0.5 * own.metallic, unlit=False), colors)
+
+    monkeypatch.setattr(file_material, "material_of", other)
+    assert broken("filed") == {"an unlit", "a file's", "metal scatters,"}
+
+
+def test_lenses_that_bend_otherwise_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = distortion.Distortion.bent
+    monkeypatch.setattr(distortion.Distortion, "bent", lambda lens, x, y: sound(lens._replace(p1=lens.p2), x, y))
+    assert broken("projections") == {"points appear"} and broken("cameras") == {"the depth"}
 
 
 def test_media_around_the_eye_in_another_order_are_found(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -220,7 +220,7 @@ _CHANGES: dict[str, Change] = {
     "shadow rays pass the light": Constant("SHORT_OF_LIGHT", "2.0"),
     "lights shine through from behind": Rule("light-in-front", compare("<=", "-np.inf")),
     "light falls off as 1 / r": Rule("inverse-square", argument(1, "np.sqrt(_)")),
-    "clamped specular: shininess at most 50": Function("shading.specular", _CLAMPED),
+    "clamped specular: shininess at most 50": Function("phong.specular", _CLAMPED),
     "highlights left out below R.V = 0.5": Rule("highlight-in-front", compare("<=", "0.5")),
     "interpolated normals not normalised": Rule("unit-shading-normal", call("normalized", "_0")),
     "rays leave a face from its other side": Rule("side-of-start", choice(then="-1", otherwise="1")),

@@ -9,12 +9,21 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from renderer.scene.camera import Camera, EquirectangularCamera, FisheyeCamera, OpenCVFisheyeCamera, PinholeCamera
+from renderer.scene.camera import (
+    Camera,
+    EquirectangularCamera,
+    FisheyeCamera,
+    OpenCVCamera,
+    OpenCVFisheyeCamera,
+    PinholeCamera,
+)
 
 Floats = NDArray[np.float64]
 BY = "the projection's formula"
 # Number of kinds of ``random``.
-KINDS = 4
+KINDS = 5
+# Steps that invert a lens: as many as leave roundings alone on these films.
+_STEPS = 120
 
 
 def random(rng: Generator, kind: int, place: dict[str, Any], size: tuple[int, int]) -> Camera:
@@ -28,7 +37,38 @@ def random(rng: Generator, kind: int, place: dict[str, Any], size: tuple[int, in
     film = {"width": size[0], "height": size[1], "skew": float(rng.uniform(-0.1, 0.1) * max(size)), **lens}
     if kind == 2:
         return PinholeCamera(**place, **film)
+    if kind == 3:
+        return OpenCVCamera(**place, **film, **lens_of(rng))
     return OpenCVFisheyeCamera(**place, **film, k1=0.02, k2=float(rng.uniform(0.0, 0.01)), k4=1e-4)
+
+
+def lens_of(rng: Generator) -> dict[str, Any]:
+    """Coefficients of a lens whose picture goes on to all sides."""
+    radial = rng.uniform((0.01, 0.002, 1e-4), (0.05, 0.006, 3e-4))
+    return dict(zip(("k1", "k2", "k3", "p1", "p2"), (*radial, *rng.uniform(-0.01, 0.01, 2)), strict=True))
+
+
+def bent(lens: dict[str, Any], x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Where a lens shows what a pinhole shows at (x, y)."""
+    radial, aside, below = _parts(lens, x, y)
+    return x * radial + aside, y * radial + below
+
+
+def _parts(lens: dict[str, Any], x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
+    """The radial factor and the two tangential terms of OpenCV's documentation."""
+    square = x**2 + y**2
+    radial = 1.0 + lens["k1"] * square + lens["k2"] * square**2 + lens["k3"] * square**3
+    p1, p2 = lens["p1"], lens["p2"]
+    return radial, 2.0 * p1 * x * y + p2 * (square + 2.0 * x**2), p1 * (square + 2.0 * y**2) + 2.0 * p2 * x * y
+
+
+def _straight(lens: dict[str, Any], x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """The inverse of ``bent``, by the iteration of ``cv2.undistortPoints``, far longer."""
+    u, v = x, y
+    for _ in range(_STEPS):
+        radial, aside, below = _parts(lens, u, v)
+        u, v = (x - aside) / radial, (y - below) / radial
+    return u, v
 
 
 def ways(camera: Camera, width: int, height: int) -> Floats:
@@ -41,10 +81,13 @@ def ways(camera: Camera, width: int, height: int) -> Floats:
         right, up = u - width / 2.0, height / 2.0 - v
         angle = np.radians(camera.fov) * np.sqrt(right**2 + up**2) / min(width, height)
         return _away(np.where(angle > np.radians(camera.fov) / 2.0, np.nan, angle), np.arctan2(up, right))
-    assert isinstance(camera, PinholeCamera | OpenCVFisheyeCamera)
+    assert isinstance(camera, PinholeCamera | OpenCVCamera | OpenCVFisheyeCamera)
     matrix = np.array([[camera.fx, camera.skew, camera.cx], [0.0, camera.fy, camera.cy], [0.0, 0.0, 1.0]])
     right, down, one = np.moveaxis(np.stack([u, v, np.ones_like(u)], axis=-1) @ np.linalg.inv(matrix).T, -1, 0)
-    if isinstance(camera, PinholeCamera):
+    if isinstance(camera, OpenCVCamera):
+        lens = {name: getattr(camera, name) for name in ("k1", "k2", "k3", "p1", "p2")}
+        right, down = _straight(lens, right, down)
+    if isinstance(camera, PinholeCamera | OpenCVCamera):
         return np.stack([right, -down, -one], axis=-1)
     return _away(_undistorted(camera, np.sqrt(right**2 + down**2)), np.arctan2(-down, right))
 
