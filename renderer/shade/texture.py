@@ -66,13 +66,11 @@ def texture_at(textures, texels, texture, patch):
     if filter_ == NEAREST:
         return _nearest(texels, wraps, image, x, y)
     if filter_ == MIPMAP:
-        along = _turned(textures, row, patch.along_u, patch.along_v)
-        across = _turned(textures, row, patch.across_u, patch.across_v)
-        longer, shorter = _texels(along, image), _texels(across, image)
-        if shorter > longer:
-            along, across, longer = across, along, shorter
+        along, longer, area = _ellipse(
+            _turned(textures, row, image, patch.along_u, patch.along_v),
+            _turned(textures, row, image, patch.across_u, patch.across_v),
+        )
         if longer > 1.0:
-            area = abs(along[0] * across[1] - along[1] * across[0]) * (image.wide * image.high)
             return _mean(texels, wraps, np.int64(load(textures, row + LEVELS)), image, (x, y), along, longer, area)
     return _between_four(texels, wraps, image, x, y)
 
@@ -88,19 +86,29 @@ def _moved(textures, row, u, v):
 
 
 @inlined
-def _turned(textures, row, u, v):
+def _turned(textures, row, image, u, v):
+    """A vector of coordinates in texels."""
     at = row + TRANSFORM
     return (
-        load(textures, at) * u + load(textures, at + 1) * v,
-        load(textures, at + 3) * u + load(textures, at + 4) * v,
+        (load(textures, at) * u + load(textures, at + 1) * v) * image.wide,
+        (load(textures, at + 3) * u + load(textures, at + 4) * v) * image.high,
     )
 
 
 @inlined
-def _texels(axis, image):
-    """The length of an axis in texels."""
-    x, y = axis[0] * image.wide, axis[1] * image.high
-    return math.sqrt(x * x + y * y)
+def _ellipse(a, b):
+    """The longer axis of the ellipse to which two vectors make a circle's radii, its length, and the product of both.
+
+    The vectors are perpendicular before they are turned into texels, and seldom after that.
+    """
+    xx, yy, xy = a[0] * a[0] + b[0] * b[0], a[1] * a[1] + b[1] * b[1], a[0] * a[1] + b[0] * b[1]
+    half = 0.5 * (xx - yy)
+    root = math.sqrt(half * half + xy * xy)
+    longer = math.sqrt(0.5 * (xx + yy) + root)
+    x, y = (half + root, xy) if half >= 0.0 else (xy, root - half)
+    size = math.sqrt(x * x + y * y)
+    axis = (x * (longer / size), y * (longer / size)) if size > 0.0 else (longer, 0.0)
+    return axis, longer, abs(a[0] * b[1] - a[1] * b[0])
 
 
 @kernel
@@ -115,15 +123,16 @@ def _mean(texels, wraps, levels, image, middle, along, longer, area):
     count = 1 if whole else np.int64(minimum(longer * longer / maximum(area, longer), _MOST_MEANS) + 0.5)
     # rule: mip-level
     number, share = _level_of(_LONGEST if whole else longer / count, levels)
+    wide, high = image.wide, image.high
     # Of several circles each from one level, as their mean is smooth without blending.
     if count > 1:
         number, share = (number + 1, 0.0) if share > 0.5 else (number, 0.0)
     for _ in range(number):
         image = _half(image)
-    total = splat4(0.0)
+    total, x_step, y_step = splat4(0.0), along[0] / wide, along[1] / high
     for k in range(count):
         step = (k + 0.5) / count - 0.5
-        x, y = middle[0] + (0.0 if whole else along[0] * step), middle[1] + (0.0 if whole else along[1] * step)
+        x, y = middle[0] + (0.0 if whole else x_step * step), middle[1] + (0.0 if whole else y_step * step)
         found = _between_four(texels, wraps, image, x, y)
         if share > 0.0:
             found = _mixed(found, _between_four(texels, wraps, _half(image), x, y), share)

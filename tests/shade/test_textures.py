@@ -370,3 +370,13 @@ def test_the_path_of_a_ray_adds_up_to_its_pixel() -> None:
         sums = np.sum([segment.radiance for segment in path], axis=0)
         np.testing.assert_allclose(sums, image.radiance[row, column], rtol=1e-5, atol=1e-6)
         assert len(path) == image.rays[row, column]
+
+
+def test_both_faces_of_a_square_blur_a_stretched_texture_alike() -> None:
+    stripes = np.random.default_rng(5).random((64, 64, 1), np.float32)
+    texture = glowing(Texture(stripes, transform=((8, 0, 0), (0, 2, 0))))
+    one, other = (
+        seen((Mesh(CORNERS, faces, texcoords=CORNERS[:, :2]), texture), size=32)
+        for faces in (FACES, [[1, 2, 3], [1, 3, 0]])
+    )
+    np.testing.assert_allclose(one, other, atol=2e-3)
