@@ -112,8 +112,9 @@ def stated(signature: Callable[Concatenate[Any, Stated], None]) -> Callable[Conc
 
 def _unpacked(value: object) -> object:
     if isinstance(value, np.generic | np.ndarray):
-        # Those of three axes are images.
-        return value if value.ndim == 3 else value.tolist()
+        # Those of three axes are images, and those of two if they are of bytes.
+        is_image = value.ndim == 3 or (value.ndim == 2 and value.dtype in (np.uint8, np.uint16))
+        return value if is_image else value.tolist()
     if isinstance(value, list):
         return [_unpacked(entry) for entry in value]
     return tuple(_unpacked(entry) for entry in value) if type(value) is tuple else value

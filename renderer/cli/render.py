@@ -160,7 +160,7 @@ def _matte(ready: Any, options: argparse.Namespace) -> Any:
     from renderer.system.threads import checked_threads
 
     scene = ready.scene
-    given = {name: getattr(options, name) for name in ("resolution", "samples")}
+    given = {name: getattr(options, name) for name in ("resolution", "samples", "filter")}
     chosen = checked_settings(scene.render, given, scene.camera)
     left, top, right, bottom = options.window or (0, 0, *chosen.resolution)
     threads, rows, columns = checked_threads(options.threads), (top, bottom), (left, right)
@@ -187,9 +187,13 @@ def _summary(image: Any, options: argparse.Namespace) -> str:
 
 def _check_output_is_no_input(options: argparse.Namespace, files: list[Path], scene: Any) -> None:
     """Refuse to write the picture over one of its inputs, also through links."""
+    from renderer.materials.base import appearance_of
     from renderer.system.files import are_apart
 
     read = [*files, *(thing.mesh for thing in scene.objects if isinstance(thing.mesh, Path))]
+    looks = [appearance_of(material) for material in scene.materials.values()]
+    images = [texture.image.source for look in looks for texture in look.textures.values()]
+    read += [image for image in images if isinstance(image, Path)]
     written = [options.write_scene] if options.write_scene else []
     apart, output = are_apart([options.output], [*read, *written]), os.path.realpath(options.output)
     expect(apart, "--output", "another file than the scene's own", f"{output} by a link")

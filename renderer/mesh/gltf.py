@@ -286,7 +286,10 @@ def _corners(
             normals = normals + weight * accessors.floats(target["NORMAL"])
     attributes: dict[str, Any] = {"normals": normals}
     if "COLOR_0" in given:
-        attributes["colors"] = accessors.floats(given["COLOR_0"])[:, :3]
+        colors = accessors.floats(given["COLOR_0"])
+        if colors.shape[1] == 4 and (colors[:, 3] < 1.0).any():
+            reading.note("left out: the alpha of colours of vertices")
+        attributes["colors"] = colors[:, :3]
     if "TEXCOORD_0" in given:
         # From the lower left, where the file counts from the upper.
         attributes["texcoords"] = accessors.floats(given["TEXCOORD_0"]) * [1.0, -1.0] + [0.0, 1.0]

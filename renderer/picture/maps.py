@@ -111,10 +111,12 @@ def _linear(pixels: NDArray[Any], is_srgb: bool) -> NDArray[np.float32]:
     channels = pixels.shape[2]
     alpha = channels in (2, 4)
     most = 1.0 if pixels.dtype.kind == "f" else float(np.iinfo(pixels.dtype).max)
-    colors = pixels[..., : channels - alpha] / np.float64(most)
+    colors = pixels[..., : channels - alpha]
     # rule: linear-of-srgb
     if is_srgb:
-        colors = linear_of_srgb(colors)
+        colors = linear_of_srgb(np.arange(most + 1.0) / most).astype(np.float32)[colors]
+    else:
+        colors = colors / np.float64(most)
     found[..., :3] = colors
     if alpha:
         # rule: alpha-of-image
@@ -134,15 +136,23 @@ def linear_of_srgb(encoded: NDArray[Any]) -> NDArray[np.float64]:
 
 def _pyramid(level: NDArray[np.float32], whole: bool) -> Iterator[NDArray[np.float32]]:
     """An image and, if the ``whole`` pyramid is wanted, means of it with half the sides each, down to one texel."""
-    from PIL import Image as Pillow
-
     yield level
     while whole and max(level.shape[:2]) > 1:
-        size = max(level.shape[1] // 2, 1), max(level.shape[0] // 2, 1)
-        # rule: mean-of-texels
-        channels = [Pillow.fromarray(level[..., k]).resize(size, Pillow.Resampling.BOX) for k in range(4)]
-        level = np.stack([np.asarray(channel) for channel in channels], axis=2)
+        level = np.swapaxes(_halved(np.swapaxes(_halved(level), 0, 1)), 0, 1)
         yield level
+
+
+def _halved(rows: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The means of two rows each; of an odd number, of two and a part of a third."""
+    count, half = len(rows), len(rows) // 2
+    if half == 0:
+        return rows
+    if count % 2 == 0:
+        first, second = rows[::2], rows[1::2]
+        # rule: mean-of-texels
+        return np.float32(0.5) * (first + second)
+    after = (np.arange(1, half + 1) / count).astype(np.float32)[:, None, None]
+    return after[::-1] * rows[:-1:2] + np.float32(half / count) * rows[1::2] + after * rows[2::2]
 
 
 def texcoords_of(instance: Instance, mesh: Mesh, look: Appearance) -> NDArray[np.float64]:

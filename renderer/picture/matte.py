@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.materials.columns import AMBIENT, KIND, UNLIT
+from renderer.materials.columns import AMBIENT, IOR, KIND, UNLIT
 from renderer.picture.encoding import write_pixels
 from renderer.picture.exposure import exposed
 from renderer.picture.image import srgb
@@ -15,7 +15,7 @@ from renderer.picture.prepare import PreparedScene
 from renderer.picture.tone import toned
 from renderer.scene.camera import Camera
 from renderer.scene.scene import RenderSettings
-from renderer.shade.records import EMISSION, TINTED
+from renderer.shade.records import EMISSION, OPACITY, OPACITY_MAP, TINTED
 from renderer.system.files import write_atomically
 from renderer.trace.spawn import BOUNDED
 
@@ -56,20 +56,22 @@ def matte_of(
 ) -> Matte:
     """The matte of the picture with these arguments; see ``PreparedScene.picture``.
 
-    Two pictures by the same rays tell it, without bounces: white surfaces before black, and black surfaces before the
-    background.
+    Two pictures by the same rays tell it, without bounces but through surfaces that are partly there: white surfaces
+    before black, and black surfaces before the background.
     """
     shapes, colors, sky = _unlit(prepared), prepared.arrays.colors, prepared.arrays.sky
-    direct = chosen.model_copy(update={"max_depth": 0})
+    blends = bool((shapes.arrays.maps[:, OPACITY] < 1.0).any() or (shapes.arrays.maps[:, OPACITY_MAP] >= 0.0).any())
+    if not blends:
+        chosen = chosen.model_copy(update={"max_depth": 0})
 
     def seen(ambient: float, background: NDArray[np.float64], sky: NDArray[np.float64]) -> NDArray[np.float32]:
         arrays = shapes.arrays._replace(colors=np.array([[ambient] * 3, background]), sky=sky)
         shown = replace(shapes, arrays=arrays)
-        return shown.picture(camera, direct, BOUNDED, threads, finished, (), band, columns=columns).radiance
+        return shown.picture(camera, chosen, BOUNDED, threads, finished, (), band, columns=columns).radiance
 
     share = seen(1.0, np.zeros(3), sky[:0])[..., 0].astype(np.float64)
     hits = np.clip(chosen.samples * share, 0.0, chosen.samples)
-    if chosen.filter != "mitchell":  # all samples count 1, up to the rounding of float32
+    if chosen.filter != "mitchell" and not blends:  # all samples count 1, up to the rounding of float32
         hits = np.rint(hits)
     return Matte(hits, chosen.samples, seen(0.0, colors[1], sky))
 
@@ -78,11 +80,11 @@ def _unlit(prepared: PreparedScene) -> PreparedScene:
     """``prepared`` with opaque surfaces whose radiance is that of the ambient light."""
     arrays = prepared.arrays
     materials = np.zeros_like(arrays.materials)
-    materials[:, KIND], materials[:, AMBIENT : AMBIENT + 3] = UNLIT, 1.0
+    materials[:, KIND], materials[:, AMBIENT : AMBIENT + 3], materials[:, IOR] = UNLIT, 1.0, 1.0
     # Of what changes along surfaces, opacity alone is left.
     maps = arrays.maps.copy()
     maps[:, :EMISSION], maps[:, EMISSION : EMISSION + 3], maps[:, TINTED] = -1.0, 0.0, 0.0
-    needs = replace(prepared.needs, reflection=False, refraction=False)
+    needs = replace(prepared.needs, reflection=False, refraction=prepared.needs.textures)
     alone = arrays._replace(materials=materials, maps=maps, media=arrays.media[:0], touching=arrays.touching[:0])
     return replace(prepared, needs=needs, arrays=alone)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -10,6 +11,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from renderer.arguments.fields import SceneWarning
+from renderer.materials.base import appearance_of
 from renderer.materials.dielectric import Dielectric
 from renderer.materials.phong import Phong
 from renderer.materials.registry import Material
@@ -52,6 +54,7 @@ def with_own_materials(table: dict[str, Any]) -> dict[str, Any]:
     if not isinstance(given, list | tuple) or all(_has_material(each) for each in given):
         return table
     materials, objects, known = dict(table.get("materials") or {}), list[Any](), dict[Any, list[Part]]()
+    names = Counter[str]()
     for each in given:
         if _has_material(each):
             objects.append(each)
@@ -65,17 +68,17 @@ def with_own_materials(table: dict[str, Any]) -> dict[str, Any]:
             *(repr(entry.get(k)) for k in ("normals", "crease")),
         )
         if which not in known:
-            known[which] = [_named_in(materials, part) for part in _parts_of_entry(entry, space)]
+            known[which] = [_named_in(materials, names, part) for part in _parts_of_entry(entry, space)]
         objects += [{**entry, "mesh": part.mesh, "material": part.name} for part in known[which]]
     return {**table, "materials": materials, "objects": objects}
 
 
-def _named_in(materials: dict[str, Any], part: Part) -> Part:
-    """The part, whose material is then among ``materials`` by a name that no other has."""
-    name, count = part.name, 1
+def _named_in(materials: dict[str, Any], names: Counter[str], part: Part) -> Part:
+    """The part, whose material is then among ``materials`` by a name of its own; ``names`` counts those that recur."""
+    name = part.name
     while materials.setdefault(name, part.material) != part.material:
-        count += 1
-        name = f"{part.name} {count}"
+        names[part.name] += 1
+        name = f"{part.name} {names[part.name] + 1}"
     return part._replace(name=name)
 
 
@@ -110,20 +113,29 @@ def parts_of_file(mesh: Mesh, space: Space, smooth: bool, crease: float) -> list
     rows = np.full(len(mesh.faces), -1) if mesh.face_materials is None else mesh.face_materials
     present = np.unique(rows).tolist() or [-1]
     whole = mesh.creased(crease) if smooth and mesh.normals is None and len(present) > 1 else mesh
+    ends = np.cumsum(np.unique(rows, return_counts=True)[1])[:-1]
+    chosen = np.split(np.argsort(rows, kind="stable"), ends)
     parts = []
-    for row in present:
+    for row, faces in zip(present, chosen, strict=True):
         own = mesh.materials[row] if row >= 0 else None
         name = f"{mesh.name or 'mesh'}: {own.name or row}" if own else f"{mesh.name or 'mesh'}: plain"
-        part = whole if len(present) == 1 else _of_faces(whole, rows == row)
+        part = whole if len(present) == 1 else _of_faces(whole, faces)
         look = material_of(own, colors) if own else Phong(diffuse=1.0 if colors else 0.8, vertex_colors=colors)
-        parts.append(Part(part, name, look))
+        parts.append(Part(part, name, look if mesh.texcoords is not None else _without_maps(look)))
     return parts
+
+
+def _without_maps(look: Material) -> Material:
+    """A material for a mesh without texture coordinates."""
+    maps = appearance_of(look).textures
+    return look.model_copy(update=dict.fromkeys(maps)) if maps else look
 
 
 def not_shown(mesh: Mesh) -> list[str]:
     """The names of what the materials of a mesh have and pictures do not show."""
-    found = {name for material in mesh.materials for name in material.textures if name in _NOT_SHOWN}
-    return sorted(name.removesuffix("_texture") for name in found)
+    found = {name for material in mesh.materials for name in material.textures}
+    shown = set() if mesh.texcoords is None else found - set(_NOT_SHOWN)
+    return sorted(name.removesuffix("_texture") for name in found - shown)
 
 
 def _of_faces(mesh: Mesh, chosen: Any) -> Mesh:
@@ -139,7 +151,8 @@ def material_of(own: MeshMaterial, colors: Space | None = None) -> Material:
     Metal returns light in its base colour: evenly the share of its roughness, as pictures mirror nothing blurred, and
     the rest in highlights and mirrored. Other surfaces mirror 0.04. Highlights have the exponent 2 / roughness^4 - 2,
     and the height at which they return as much light. Surfaces smoother than 0.25 also mirror what is around. Textures
-    of metal, roughness and transmission count by their means. What transmits at least half is glass.
+    of metal, roughness and transmission count by their means. What transmits at least half is glass, unless it
+    has textures, colours of vertices or emission.
     """
     shared: dict[str, Any] = {"normal_map": own.normal_texture, "vertex_colors": colors, **_opacity(own)}
     base, texture = own.base_color, own.base_color_texture
@@ -149,7 +162,7 @@ def material_of(own: MeshMaterial, colors: Space | None = None) -> Material:
     metallic = own.metallic * _mean(own.metallic_roughness_texture, 2)
     roughness = own.roughness * _mean(own.metallic_roughness_texture, 1)
     through = own.transmission * _mean(own.transmission_texture, 0)
-    if through >= 0.5:
+    if through >= 0.5 and not (texture or own.normal_texture or colors or any(own.emissive)):
         return Dielectric(ior=own.ior, transmittance=np.multiply(own.transmission_color, through))
     # rule: mirrored-by-metal
     straight = _STRAIGHT * (1.0 - metallic) + np.multiply(base, metallic * (1.0 - roughness))
@@ -171,6 +184,7 @@ def material_of(own: MeshMaterial, colors: Space | None = None) -> Material:
         reflectance=np.minimum(mirrored, 1.0),
         reflectance_map=of_metal,
         transmittance=np.multiply(own.transmission_color, through),
+        transmittance_map=texture if through > 0.0 else None,
         ior=own.ior,
         emission=own.emissive,
         emission_map=own.emissive_texture,

@@ -25,7 +25,7 @@ from renderer.shade.records import (
 
 # Texels have red, green, blue and alpha.
 CHANNELS = 4
-# Coordinates beyond this, in images, are those of its corner: whole numbers of texels end there.
+# Coordinates beyond this, in images, are as there: whole numbers of texels end there.
 _FARTHEST = 2.0**31
 # The most means that a MIPMAP takes along an ellipse; one that is longer still blurs the texture.
 _MOST_MEANS = 16
@@ -81,8 +81,15 @@ def _moved(textures, row, u, v):
     # rule: moved-texture
     x = (load(textures, at) * u + load(textures, at + 1) * v) + load(textures, at + 2)
     y = (load(textures, at + 3) * u + load(textures, at + 4) * v) + load(textures, at + 5)
-    # NaN is beyond too.
-    return x if abs(x) < _FARTHEST else 0.0, y if abs(y) < _FARTHEST else 0.0
+    return _within(x), _within(y)
+
+
+@inlined
+def _within(x):
+    """The number or, if it is beyond, that at the end; 0 for NaN."""
+    if abs(x) < _FARTHEST:
+        return x
+    return _FARTHEST if x > 0.0 else -_FARTHEST if x < 0.0 else 0.0
 
 
 @inlined

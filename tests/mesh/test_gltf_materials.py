@@ -92,6 +92,16 @@ def test_fields_and_defaults_are_those_of_the_format(entry: dict[str, Any], fiel
     assert read(entry) == MeshMaterial(**{"metallic": 1.0, **fields})
 
 
+def test_alpha_of_colours_of_vertices_is_named() -> None:
+    file = Glb()
+    given = {
+        "POSITION": file.add(TRIANGLE, "f", 5126, "VEC3", 0),
+        "COLOR_0": file.add([[1, 1, 1, 0.5]] * 3, "f", 5126, "VEC4", 0),
+    }
+    with pytest.warns(RepairWarning, match="the alpha of colours of vertices"):
+        load_mesh(file.file(**SCENE, meshes=[{"primitives": [{"attributes": given}]}]))
+
+
 def test_a_texture_of_transmission_is_read() -> None:
     entry = {"extensions": {"KHR_materials_transmission": {"transmissionTexture": {"index": 0}}}}
     found = read(entry, textures=[{"source": 0}], images=[{"uri": URI}])

@@ -12,7 +12,7 @@ from varied import BASE, picture, scene_of, write_meshes
 
 from renderer import OrthographicCamera, Phong, Scene, SceneObject, prepare, srgb
 from renderer.cli.main import main
-from renderer.mesh.shapes import box
+from renderer.mesh.shapes import box, grid
 from renderer.picture.exposure import exposed
 from renderer.picture.matte import cut_out, matte_of
 
@@ -55,6 +55,20 @@ def test_alpha_is_the_share_of_a_pixel_that_a_box_covers() -> None:
     assert found[0, 0, :3].tolist() == srgb([0.5, 0.2, 0.0]).tolist()
 
 
+@cases("samples", [1, 9])
+def test_alpha_of_what_is_partly_there_is_its_opacity_unless_something_is_behind(samples: int) -> None:
+    camera = OrthographicCamera(eye=(0.0, 0.0, 5.0), target=(0.0, 0.0, 0.0), height=1.0)
+    pane = SceneObject(mesh=grid(1, 1), material="pane", rotate=(90, 0, 0), translate=(-1.0, 0.5, 1.0), scale=2)
+    wall = SceneObject(mesh=box(), material="red", translate=(0.0, -0.5, -1.0))
+    materials = {"pane": Phong(diffuse=0.5, opacity=0.3), "red": Phong(diffuse=0, ambient=(0.5, 0.2, 0.0))}
+    scene = Scene(camera=camera, materials=materials, objects=[pane, wall], ambient=1, background=(0.1, 0.4, 0.9))
+    scene = scene.altered(render=scene.render.model_copy(update={"resolution": (2, 1)}))
+    found, radiance, _ = pixels(scene, samples)
+    assert found[0, :, 3].tolist() == [77, 255]
+    behind = (1 - found[0, :, 3:] / 255) * (0.1, 0.4, 0.9)
+    np.testing.assert_allclose(decoded(found[0, :, :3]) * found[0, :, 3:] / 255 + behind, radiance[0], atol=0.004)
+
+
 @cases("samples", [1, 4, 9, 25])
 @cases(("stops", "filter"), [(0.0, "box"), (-2.0, "box"), (0.5, "tent"), (0.0, "gaussian"), (-2.0, "mitchell")])
 @cases("table", [DIM, {key: DIM[key] for key in DIM if key != "background"} | {"sky": SKY}])
@@ -80,6 +94,15 @@ def test_over_its_background_it_is_the_picture_again(
 
 
 @pytest.mark.judges("octree-render render --transparent", "octree-render render --exposure")
+def test_the_command_takes_its_filter_for_both(tmp_path: Path) -> None:
+    write_meshes(tmp_path)
+    scene_of(tmp_path, DIM | {"render": DIM["render"] | {"resolution": [20, 16]}})
+    words = ["render", str(tmp_path / "scene.toml"), "--transparent", "--quiet", "--samples", "16"]
+    assert main([*words, "--filter", "gaussian", "-o", str(tmp_path / "a.png")]) == 0
+    assert main([*words, "--change", "render.filter = 'gaussian'", "-o", str(tmp_path / "b.png")]) == 0
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
 def test_the_command_writes_it(tmp_path: Path) -> None:
     write_meshes(tmp_path)
     scene = scene_of(tmp_path, DIM)

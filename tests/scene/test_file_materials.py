@@ -20,6 +20,7 @@ from renderer import (
     load_scene,
     render,
 )
+from renderer.cli.main import main
 from renderer.mesh.shapes import box, icosphere
 from renderer.scene.file_material import material_of, parts_of_file
 from renderer.scene.scene import write_scene
@@ -50,6 +51,8 @@ def test_smooth_metal_mirrors_and_rough_metal_scatters_in_its_colour() -> None:
 def test_glass_unlit_and_highlights_of_mtl() -> None:
     glass = material_of(MeshMaterial(transmission=0.9, ior=1.3, transmission_color=(0.5, 1, 1)))
     assert isinstance(glass, Dielectric) and glass.ior == 1.3 and glass.transmittance == pytest.approx((0.45, 0.9, 0.9))
+    stained = material_of(MeshMaterial(transmission=1.0, base_color_texture=GREY, emissive=(0, 1, 0)))
+    assert isinstance(stained, Phong) and stained.transmittance_map == GREY and stained.emission == (0.0, 1.0, 0.0)
     partly = material_of(MeshMaterial(transmission=0.9, transmission_texture=GREY))
     assert isinstance(partly, Phong) and partly.transmittance == pytest.approx((0.45,) * 3)
     unlit = material_of(MeshMaterial(base_color=(0.1, 0.2, 0.3), unlit=True))
@@ -104,6 +107,20 @@ def test_a_file_alone_and_in_a_scene_file_show_its_materials(folder: Path) -> No
         seen = render(scene, resolution=40).radiance.reshape(-1, 3)
         for color in ((1, 0, 0), (0, 1, 0)):
             assert (seen == color).all(axis=1).sum() > 20
+
+
+def test_no_picture_is_written_over_an_image_of_the_scene(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = (folder / "green.png").read_bytes()
+    assert main(["render", str(folder / "a.obj"), "-o", str(folder / "green.png"), "--resolution", "4"]) == 2
+    assert "--output: expected another file than the scene's own" in capsys.readouterr().err
+    assert (folder / "green.png").read_bytes() == before
+
+
+def test_textures_without_coordinates_are_left_out_with_a_warning(folder: Path) -> None:
+    (folder / "a.obj").write_text("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nusemtl green\nf 1 2 3\n")
+    with pytest.warns(SceneWarning, match="do not show base_color of a"):
+        scene = load_scene(folder / "a.obj")
+    assert (render(scene, resolution=20).face == 0).any()
 
 
 def test_paths_of_textures_are_beside_the_scene_file(folder: Path) -> None:

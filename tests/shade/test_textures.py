@@ -126,6 +126,16 @@ def test_each_color_is_multiplied_by_its_map() -> None:
         assert not np.allclose(found, seen((square(), Phong(**usual)), size=1, **light), rtol=1e-3)
 
 
+@pytest.mark.parametrize(("u", "expected"), [(3e9, 1), (-3e9, 0), (1e300, 1)])
+def test_clamped_coordinates_far_away_have_the_edge_on_their_side(u: float, expected: int) -> None:
+    texture = Texture(np.float32([[[0], [1]]]), wrap=("clamp", "clamp"))
+    assert seen((square(np.full((4, 2), u)), glowing(texture)), size=1).tolist() == [[[expected] * 3]]
+
+
+def test_grey_bytes_of_two_axes_are_an_image() -> None:
+    assert seen((square(), glowing(np.full((2, 2), 255, np.uint8))), size=1).tolist() == [[[1, 1, 1]]]
+
+
 def test_maps_are_seen_as_they_are_where_their_colour_is_not_given() -> None:
     found = Phong(specular_map=value(0.5), opacity_map=value(1.0))
     assert (found.specular, found.diffuse) == ((1.0, 1.0, 1.0), (0.8, 0.8, 0.8))
@@ -144,6 +154,13 @@ def test_emission_is_seen_in_mirrors_and_lights_nothing_else() -> None:
 def test_mip_maps_of_an_even_image_keep_its_colour() -> None:
     even = Texture(np.full((9, 5, 3), 0.3, np.float32), transform=((900, 70, 0), (-30, 400, 0)))
     np.testing.assert_allclose(seen((square(), glowing(even))), 0.3, rtol=1e-6)
+
+
+@pytest.mark.parametrize("size", [(5, 1), (31, 7), (6, 63)])
+def test_the_last_mip_map_is_the_mean_of_an_image_of_any_size(size: tuple[int, int]) -> None:
+    image = np.random.default_rng(size[0]).random((size[1], size[0], 3), np.float32)
+    found = seen((square(), glowing(Texture(image, transform=((900, 0, 0.3), (0, 900, 0.1))))), size=2)
+    np.testing.assert_allclose(found, np.broadcast_to(image.mean(axis=(0, 1)), (2, 2, 3)), rtol=1e-5)
 
 
 def floor_of(filter: Filter) -> Image:
@@ -204,15 +221,15 @@ HALF = np.array([[[1, 1, 1, 1], [1, 1, 1, 0]]], np.float32)
 HOLED = Phong(diffuse=0, emission=(0, 1, 0), cutoff=0.5, opacity_map=Texture(HALF, filter="nearest"))
 
 
-@pytest.mark.parametrize("layers", [1, 3])
+@pytest.mark.parametrize("layers", [1, 3, 300])
 def test_rays_pass_through_holes_to_what_is_behind(layers: int) -> None:
-    masks = [(square(height=0.2 * (k + 1)), HOLED) for k in range(layers)]
+    masks = [(square(height=0.6 / layers * (k + 1)), HOLED) for k in range(layers)]
     image = render(scene_of(*masks, (square(), glowing(value((1, 0, 0))))), resolution=4)
     assert (
         image.radiance[:, :2].tolist() == [[[0, 1, 0]] * 2] * 4
         and image.radiance[:, 2:].tolist() == [[[1, 0, 0]] * 2] * 4
     )
-    np.testing.assert_allclose(image.depth, [[1 - 0.2 * layers] * 2 + [1.0] * 2] * 4)
+    np.testing.assert_allclose(image.depth, [[0.4] * 2 + [1.0] * 2] * 4)
     assert set(image.face[:, :2].ravel()) <= {2 * layers - 2, 2 * layers - 1}
     assert set(image.face[:, 2:].ravel()) == {2 * layers, 2 * layers + 1}
     alone = render(scene_of(*masks, background=0.25), resolution=4)

@@ -12,7 +12,7 @@ _CHANGES: dict[str, Change] = {
     "textures are not skewed": Rule("moved-texture", without("+", 1)),
     "mip maps a level too coarse": Rule("mip-level", argument(0, "2.0 * (_)")),
     "mip maps as wide as an ellipse is long": Rule("mips-along-ellipse", choice(otherwise="1")),
-    "mip maps of one texel in four": Rule("mean-of-texels", call("resize", "_call(_0, 0)")),
+    "mip maps of one texel in four": Rule("mean-of-texels", value("first")),
     "codes of images taken as linear": Rule("linear-of-srgb", value("False")),
     "the curve of sRGB without its toe": Rule("toe-of-srgb", call("where", "_2")),
     "floats of images taken as sRGB": Rule("floats-are-linear", without("and", 1)),
