@@ -354,6 +354,6 @@ def test_a_path_that_the_terminal_cannot_spell_ends_well(tmp_path: Path) -> None
 def test_info_lists_the_materials_of_a_mesh_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     (tmp_path / "a.mtl").write_text("newmtl oak\nKd 0.5 0.25 1\nmap_Kd a.ppm\nd 0.5\n")
     (tmp_path / "a.ppm").write_bytes(b"P6 2 1 255 abcdef")
-    (tmp_path / "a.obj").write_text("mtllib a.mtl\nusemtl oak\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    (tmp_path / "a.obj").write_text("mtllib a.mtl\nusemtl oak\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n")
     assert main(["info", str(tmp_path / "a.obj")]) == 0
     assert "    oak: colour 0.5 0.25 1, alpha blend; textures: base_color 2 x 1\n" in capsys.readouterr().out
