@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
+from dataclasses import fields
 from typing import Annotated, Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field
 
 from renderer.arguments.fields import Fields
+from renderer.errors import expect_known
 from renderer.materials.appearance import BLACK, Appearance
 from renderer.mesh.texture import Texture
 from renderer.mesh.texture_image import TextureImage
@@ -19,10 +21,13 @@ from renderer.mesh.texture_image import TextureImage
 def _texture(value: Any) -> Any:
     """A texture of what stands for one: an image, or a table of a scene file."""
     if isinstance(value, dict) and "image" in value:
+        for key in value:
+            expect_known("key", key, _KEYS)
         return Texture(**value)
     return Texture(value) if isinstance(value, str | bytes | os.PathLike | TextureImage | np.ndarray) else value
 
 
+_KEYS = tuple(field.name for field in fields(Texture))
 TextureLike = Texture | TextureImage | str | bytes | os.PathLike[str] | NDArray[Any]
 AnyTexture = Annotated[Texture, BeforeValidator(_texture)]
 Share = Annotated[float, Field(ge=0.0, le=1.0, strict=True)]

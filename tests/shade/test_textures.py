@@ -373,7 +373,7 @@ def test_what_is_no_image_is_refused(bad: Any) -> None:
 
 
 def test_values_of_fields_that_are_no_textures_are_refused() -> None:
-    for bad in (3, {"image": "a.png", "filter": "cubic"}, {"pixels": 1}):
+    for bad in (3, {"image": "a.png", "filter": "cubic"}, {"image": "a.png", "warp": 1}, {"pixels": 1}):
         with pytest.raises(SceneError, match="diffuse_map"):
             Phong(diffuse_map=bad)
 
