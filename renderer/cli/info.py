@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
-from renderer.cli.scene import SPLIT, add_scene
+from renderer.arguments.types import SPLIT, Split
+from renderer.cli.scene import SPLIT_RULE, add_scene
 from renderer.errors import expect
 from renderer.system.terminal import say
 
@@ -17,7 +18,7 @@ def add_info(commands: Any) -> None:
     """Add the command to a parser's ``commands``."""
     info = commands.add_parser("info", help="list what a scene holds, and its octree")
     add_scene(info, shown=False)
-    info.add_argument("--split", choices=("midpoint", "sah"), default="midpoint", help=SPLIT)
+    info.add_argument("--split", choices=get_args(Split), default=SPLIT, help=SPLIT_RULE)
     info.set_defaults(command=_info)
 
 

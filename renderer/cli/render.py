@@ -7,10 +7,11 @@ import sys
 import tempfile
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
+from renderer.arguments.types import SPLIT, Split
 from renderer.cli.cluster import add_cluster, render_on_cluster
-from renderer.cli.scene import SPLIT, add_scene, say_up, write_scene_of
+from renderer.cli.scene import SPLIT_RULE, add_scene, say_up, write_scene_of
 from renderer.cli.turntable import add_frames, render_turntable
 from renderer.errors import expect
 from renderer.system.terminal import say
@@ -48,7 +49,7 @@ def add_render(commands: Any) -> None:
     add_frames(render)
     render.add_argument("--change", action="append", default=[], metavar="TOML", help=_CHANGE)
     render.add_argument("--accelerator", choices=("auto", "octree", "brute"), default="auto", help=_ACCELERATOR)
-    render.add_argument("--split", choices=("midpoint", "sah"), default="midpoint", help=SPLIT)
+    render.add_argument("--split", choices=get_args(Split), default=SPLIT, help=SPLIT_RULE)
     render.add_argument("--threads", type=int, metavar="N", help="default: all processors")
     add_cluster(render)
     render.add_argument("--quiet", action="store_true", help="no progress bar, no summary, no notices")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from renderer.errors import expect
 
-SPLIT = "the rule that cuts cells of the octree (default: midpoint)"
+SPLIT_RULE = "the rule that cuts cells of the octree (default: %(default)s)"
 _SCENE = "a scene file (.toml), or a mesh file (.ply, .obj, .stl, .glb, .gltf), which gets a camera, a sky and a floor"
 _SEVERAL = _SCENE + "; several mesh files, and those of folders, are objects of one scene"
 _UP = "the axis of mesh files that points up (default: y); a scene file has the key up"

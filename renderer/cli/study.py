@@ -2,7 +2,7 @@
 
 import argparse
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from renderer.cli.cluster import add_cluster, on_cluster
 from renderer.cli.meshes import Files, kept_of, load_files, say_up, up_of, values_of_files
@@ -11,8 +11,6 @@ from renderer.errors import expect
 from renderer.system.terminal import say
 
 FORMATS = (".npy", ".ply", ".png")
-# It takes 50 % longer to build than "midpoint"; a million rays over a million faces repay that.
-SPLIT: Literal["sah"] = "sah"
 _KINDS = {"sky": "sky view factor", "sun": "hours of sun", "ao": "ambient occlusion"}
 # Options that one kind alone has, which are its function's.
 _OWN = {"sky": ("patches", "definition"), "sun": ("suns",), "ao": ("samples",)}
@@ -103,7 +101,7 @@ def _study(options: argparse.Namespace) -> None:
     made = _options_of(options, up)
     layout = _layout(options)
     files = load_files(paths)
-    octree = Octree.from_mesh(files.mesh, split=SPLIT, threads=options.threads)
+    octree = Octree.from_mesh(files.mesh, threads=options.threads)
     chosen = _chosen(octree, options, up)
     began = time.perf_counter()
     parts = _run(octree, Study(options.kind, made), chosen.points, options)
@@ -149,7 +147,7 @@ def _run(octree: Any, study: Any, points: Any, options: argparse.Namespace) -> A
     from renderer.cluster import run_on
 
     with on_cluster(options) as client:
-        return run_on(client, octree, study, points, folder, split=SPLIT, progress=progress)
+        return run_on(client, octree, study, points, folder, progress=progress)
 
 
 def _check_output(options: argparse.Namespace) -> None:

@@ -8,8 +8,9 @@ from collections.abc import Iterable, Iterator, Sequence, Sized
 from contextlib import closing, suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
+from renderer.arguments.types import SPLIT, Split
 from renderer.checkpoints.parts import remove_parts
 from renderer.checkpoints.pictures import Picture, PictureRun, checked_band, digest_of_scene
 from renderer.cluster.tasks import Results, Task, results
@@ -168,7 +169,7 @@ class _Sender:
     def __init__(self, options: dict[str, Any]) -> None:
         settings = dict(options)
         self._accelerator: str = settings.pop("accelerator", "auto")
-        self._split: Literal["midpoint", "sah"] = settings.pop("split", "midpoint")
+        self._split: Split = settings.pop("split", SPLIT)
         check_tree(self._accelerator, self._split)
         self._offset, self._planes = settings.pop("offset", "bounded"), settings.pop("planes", PLANES)
         self._media: MediaRule = settings.pop("media", "stack")

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.arguments.types import SPLIT
 from renderer.checkpoints.parts import digest_of
 from renderer.cluster.workers import SentMesh
 from renderer.errors import expect
@@ -116,7 +117,7 @@ def _by_chunks(octree: Octree | RayScene, origins: Any, directions: Any, trace: 
     mesh = octree_of(octree).mesh
     digest = digest_of(mesh.vertices, mesh.faces)
     # One task that all chunks need: a cluster keeps what it returns on each worker that asked for it.
-    sent = delayed(SentMesh(digest, mesh.vertices, mesh.faces, "midpoint"), name=f"mesh-{digest}", traverse=False)
+    sent = delayed(SentMesh(digest, mesh.vertices, mesh.faces, SPLIT), name=f"mesh-{digest}", traverse=False)
     blocks = [
         da.from_delayed(delayed(trace)(sent, a, b), (rows,), dtype)
         for rows, a, b in zip(o.chunks[0], o.to_delayed()[:, 0], d.to_delayed()[:, 0], strict=True)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from renderer.arguments.counts import count_argument
+from renderer.arguments.types import SPLIT, Split
 from renderer.checkpoints.parts import Parts, digest_of
 from renderer.checkpoints.study import PART, Study, parts_of
 from renderer.cluster.tasks import Results, Task, results
@@ -28,7 +29,7 @@ def run_on(
     folder: str | Path,
     *,
     size: int = PART,
-    split: Literal["midpoint", "sah"] = "midpoint",
+    split: Split = SPLIT,
     progress: bool = False,
 ) -> Parts:
     """The parts of a study that is computed on a cluster, with the bits of a run on this machine.
@@ -48,7 +49,7 @@ def run_on(
         it.
     size : int, default 32768
         Points of a part. It changes no bit.
-    split : {"midpoint", "sah"}, default "midpoint"
+    split : {"midpoint", "sah"}, default "sah"
         How workers build the tree, see ``Octree.from_mesh``. It changes no bit.
     progress : bool, default False
         Show a bar on standard error if that is a terminal.

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.arguments.types import Split
 from renderer.checkpoints.pictures import Picture
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
@@ -28,7 +29,7 @@ class SentMesh(NamedTuple):
     digest: str
     vertices: NDArray[np.float64]
     faces: NDArray[np.int32]
-    split: Literal["midpoint", "sah"]
+    split: Split
 
     def octree(self) -> Octree:
         """The tree over it, from this process's own or built now, whose queries take one thread each.
@@ -55,7 +56,7 @@ class SentScene(NamedTuple):
     scene: Scene
     needs: Features
     accelerator: str
-    split: Literal["midpoint", "sah"]
+    split: Split
 
     def prepared(self) -> PreparedScene:
         """The scene made ready, from this process's own or now. Other threads that need it wait."""

@@ -464,6 +464,17 @@ def square_root(typingctx, vector):
 
 
 @intrinsic
+def swap_halves(typingctx, vector):
+    """Eight lanes with the last four first."""
+
+    def codegen(context, builder, sig, args):
+        order = ir.Constant(ir.VectorType(ir.IntType(32), 8), [4, 5, 6, 7, 0, 1, 2, 3])
+        return builder.shuffle_vector(args[0], args[0], order)
+
+    return vector(vector), codegen
+
+
+@intrinsic
 def extract(typingctx, vector, index):
     """The value in one lane; the index may vary at run time."""
 

@@ -5,11 +5,12 @@ Pictures have the bits of those of the merged mesh, as a ray scene answers like 
 
 from collections.abc import Callable, Iterator
 from itertools import groupby
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.arguments.types import Split
 from renderer.materials.appearance import Appearance
 from renderer.materials.base import appearance_of
 from renderer.mesh.mesh import Mesh
@@ -30,7 +31,7 @@ _NOT_MOVED = np.eye(3, 4)
 Floats = NDArray[np.float64]
 
 
-def placed(scene: Scene, needs: Features, split: Literal["midpoint", "sah"], threads: int) -> BuiltScene | None:
+def placed(scene: Scene, needs: Features, split: Split, threads: int) -> BuiltScene | None:
     """``scene`` with each mesh once, where it pays; None where it does not, or where a mesh cannot be placed."""
     if _copied(scene) < _LEAST:
         return None

@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.arguments.types import SPLIT, Split
 from renderer.errors import expect
 from renderer.jit.notice import Stopwatch
 from renderer.lazy import lazy
@@ -164,7 +165,7 @@ def prepare_scene(
     scene: Scene,
     needs: Features,
     accelerator: str = "auto",
-    split: Literal["midpoint", "sah"] = "midpoint",
+    split: Split = SPLIT,
     threads: int | None = None,
 ) -> PreparedScene:
     """Make ``scene`` ready, by checked arguments; see ``render``."""
@@ -209,7 +210,7 @@ def tiles(width: int, height: int, side: int = TILE) -> int:
 
 
 def build_octree(
-    mesh: Mesh, accelerator: str, split: Literal["midpoint", "sah"], needs: Features, threads: int | None = None
+    mesh: Mesh, accelerator: str, split: Split, needs: Features, threads: int | None = None
 ) -> Octree | BruteForce:
     """A tree, or the blocks alone where ``accelerator`` is "brute" or no tree is needed.
 

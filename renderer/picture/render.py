@@ -6,6 +6,7 @@ from numbers import Real
 from typing import Any, Literal, NamedTuple, Unpack
 
 from renderer.arguments.arrays import real_argument
+from renderer.arguments.types import SPLIT, Split
 from renderer.errors import expect
 from renderer.picture.camera_rays import tile_side
 from renderer.picture.image import PLANES, CutWarning, Image
@@ -25,7 +26,7 @@ def render(
     *,
     camera: Camera | None = None,
     accelerator: Literal["auto", "octree", "brute"] = "auto",
-    split: Literal["midpoint", "sah"] = "midpoint",
+    split: Split = SPLIT,
     needs: Features | None = None,
     offset: Literal["bounded", "mitsuba"] | float = "bounded",
     media: MediaRule = "stack",
@@ -47,7 +48,7 @@ def render(
     accelerator : {"auto", "octree", "brute"}, default "auto"
         The octree, or a test of every ray against every face. "auto" takes the octree unless there are very few faces.
         This argument, ``split`` and ``needs`` are for a ``Scene`` that is not prepared.
-    split : {"midpoint", "sah"}, default "midpoint"
+    split : {"midpoint", "sah"}, default "sah"
         The rule by which cells of the octree are cut.
     needs : Needs, optional
         The features to prepare: at least those of ``needs_of(scene)``, which is the default. More of them cost time
@@ -127,7 +128,7 @@ def prepare(
     scene: Scene,
     *,
     accelerator: Literal["auto", "octree", "brute"] = "auto",
-    split: Literal["midpoint", "sah"] = "midpoint",
+    split: Split = SPLIT,
     needs: Features | None = None,
     threads: int | None = None,
 ) -> PreparedScene:
@@ -210,7 +211,7 @@ def _prepared(
     scene: Scene,
     max_depth: int,
     accelerator: str,
-    split: Literal["midpoint", "sah"],
+    split: Split,
     needs: Features | None,
     threads: int,
 ) -> PreparedScene:
@@ -220,7 +221,7 @@ def _prepared(
 
 def _expect_usual(accelerator: object, split: object, needs: object) -> None:
     """Refuse arguments that a prepared scene cannot change."""
-    for name, value, usual in (("accelerator", accelerator, "auto"), ("split", split, "midpoint")):
+    for name, value, usual in (("accelerator", accelerator, "auto"), ("split", split, SPLIT)):
         expect(isinstance(value, str) and value == usual, name, f"{usual!r}, as the scene is prepared", repr(value))
     expect(needs is None, "needs", "None, as the scene is prepared", repr(needs))
 

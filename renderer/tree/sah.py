@@ -1,24 +1,27 @@
 """The SAH rule: two halves at the binned plane of least cost by the surface area heuristic (Wald 2007)."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import load8, maximum, minimum, store
+from renderer.numerics.simd import extract, load, load8, maximum, minimum, pointer, select, splat8, store, swap_halves
 from renderer.trace.layout import BLOCK_FACES
-from renderer.tree.bounds import BOX, double_centre, empty_box, fit, half_area, united
+from renderer.tree.bounds import BOX, empty_box, fit, half_area, united
 from renderer.tree.hierarchy import add_part
 
 _MOST_BINS = 16
+# Of large parts only a sample of at least so many faces is sorted into bins: each third, fifth or so on, at most each
+# fifteenth. The steps are odd because faces come in pairs. Trees are as good by counted steps.
+_SAMPLE, _MOST_APART = 1024, 15
 
 
 class Bins(NamedTuple):
     """The start of the bins of each axis, their number for each unit of length, and their number on each axis."""
 
-    low: tuple
-    scale: tuple
+    low: Any
+    scale: Any
     count: int  # type: ignore[assignment]  # tuples have a method of that name
 
 
@@ -42,8 +45,9 @@ def cut_sah(faces, tree, part, count, scratch):
     """
     begin, end = tree.ranges[part]
     # Sort the faces into bins.
-    bins = _spread_bins(faces.boxes, begin, end, _MOST_BINS if end - begin > 32 else 6)
-    _fill_bins(faces.boxes, begin, end, bins, scratch)
+    apart = minimum(_MOST_APART, (end - begin) // _SAMPLE - 1 | 1) if end - begin > 2 * _SAMPLE else 1
+    bins = _spread_bins(faces.boxes, begin, end, apart, _MOST_BINS if end - begin > 32 else 6)
+    _fill_bins(faces.boxes, begin, end, apart, bins, scratch)
     # Take the cheapest plane between bins.
     best, axis, last = np.float32(np.inf), -1, 0
     for k in range(3):
@@ -57,47 +61,59 @@ def cut_sah(faces, tree, part, count, scratch):
     tree.halves[part] = count
     add_part(tree, count, begin, middle)
     add_part(tree, count + 1, middle, end)
+    if apart > 1:
+        fit(faces.boxes, begin, middle, tree.boxes, count * BOX)
+        fit(faces.boxes, middle, end, tree.boxes, (count + 1) * BOX)
+        return count + 2
     first = axis * bins.count
     fit(scratch.boxes, first, first + last + 1, tree.boxes, count * BOX)
     fit(scratch.boxes, first + last + 1, first + bins.count, tree.boxes, (count + 1) * BOX)
     return count + 2
 
 
-@kernel
-def _spread_bins(boxes, begin, end, count):
-    """The ``Bins`` between the centres of some faces; none along an axis on which these are equal."""
-    x0 = y0 = z0 = np.float32(np.inf)
-    x1 = y1 = z1 = np.float32(-np.inf)
-    for i in range(begin, end):
-        base = i * BOX
-        x, y, z = double_centre(boxes, base, 0), double_centre(boxes, base, 1), double_centre(boxes, base, 2)
-        x0, y0, z0 = minimum(x0, x), minimum(y0, y), minimum(z0, z)
-        x1, y1, z1 = maximum(x1, x), maximum(y1, y), maximum(z1, z)
-    return Bins((x0, y0, z0), (_scale(x1 - x0, count), _scale(y1 - y0, count), _scale(z1 - z0, count)), count)
-
-
 @inlined
-def _scale(extent, count):
-    return np.float32(count) / extent if extent > 0.0 else np.float32(0.0)
-
-
-@inlined
-def _bin(centre, bins, axis):
-    return minimum(bins.count - 1, maximum(0, np.int64((centre - bins.low[axis]) * bins.scale[axis])))
+def _centres(boxes, i):
+    """Lower plus upper of the i-th box along each axis, in the first three lanes; the other lanes mean nothing."""
+    box = load8(boxes, i * BOX)
+    return box - swap_halves(box)
 
 
 @kernel
-def _fill_bins(boxes, begin, end, bins, scratch):
-    """Counts and bounds of the faces whose centres fall into each bin."""
+def _spread_bins(boxes, begin, end, apart, count):
+    """The ``Bins`` between the centres of each ``apart``-th face; none along an axis on which these are equal."""
+    low, high = splat8(np.float32(np.inf)), splat8(np.float32(-np.inf))
+    for i in range(begin, end, apart):
+        centres = _centres(boxes, i)
+        low, high = minimum(low, centres), maximum(high, centres)
+    return Bins(low, select(high > low, np.float32(count) / (high - low), np.float32(0.0)), np.int64(count))
+
+
+@inlined
+def _bins_of(centres, bins):
+    """The bin of a face on each axis, by its ``_centres``; the first where the scale is infinite and this is NaN."""
+    places = minimum((centres - bins.low) * bins.scale, np.float32(bins.count - 1))
+    return maximum(splat8(np.float32(0.0)), places)
+
+
+@kernel
+def _fill_bins(boxes, begin, end, apart, bins, scratch):
+    """Counts and bounds of those of each ``apart``-th face whose centres fall into each bin."""
     for k in range(3 * bins.count):
         scratch.counts[k] = 0
         store(scratch.boxes, k * BOX, empty_box())
-    for i in range(begin, end):
-        box = load8(boxes, i * BOX)
-        for axis in range(3):
-            k = axis * bins.count + _bin(double_centre(boxes, i * BOX, axis), bins, axis)
-            scratch.counts[k] += 1
-            store(scratch.boxes, k * BOX, united(load8(scratch.boxes, k * BOX), box))
+    counts, sums = pointer(scratch.counts), pointer(scratch.boxes)
+    for i in range(begin, end, apart):
+        box, places = load8(boxes, i * BOX), _bins_of(_centres(boxes, i), bins)
+        _add(counts, sums, np.int64(extract(places, 0)), box)
+        _add(counts, sums, bins.count + np.int64(extract(places, 1)), box)
+        _add(counts, sums, 2 * bins.count + np.int64(extract(places, 2)), box)
+
+
+@inlined
+def _add(counts, boxes, k, box):
+    """Add a face to the k-th bin."""
+    store(counts, k, load(counts, k) + 1)
+    store(boxes, k * BOX, united(load8(boxes, k * BOX), box))
 
 
 @kernel
@@ -130,7 +146,7 @@ def _partition(faces, begin, end, bins, axis, last):
     boxes, spare = faces.boxes, faces.spare
     left, right = begin, begin
     for i in range(begin, end):
-        beyond = _bin(double_centre(boxes, i * BOX, axis), bins, axis) > last
+        beyond = np.int64(extract(_bins_of(_centres(boxes, i), bins), axis)) > last
         box = load8(boxes, i * BOX)
         store(boxes, left * BOX, box)
         store(spare, right * BOX, box)

@@ -7,6 +7,7 @@ from pathlib import Path
 from secrets import token_hex
 from typing import Literal, NamedTuple
 
+from renderer.arguments.types import SPLIT
 from renderer.errors import expect
 from renderer.lazy import lazy
 from renderer.materials.columns import REFLECTANCE, TRANSMITTANCE
@@ -107,7 +108,7 @@ class ShownScene:
     @lazy
     def brute(self) -> PreparedScene:
         """The same scene with every ray tested against every face."""
-        octree = build_octree(self.prepared.mesh, "brute", "midpoint", self.prepared.needs, self.threads)
+        octree = build_octree(self.prepared.mesh, "brute", SPLIT, self.prepared.needs, self.threads)
         return replace(self.prepared, built=octree, tree=tree_for(octree, self.prepared.needs))
 
 
@@ -143,7 +144,7 @@ def prepare_shown(scene: Scene, path: Path | None = None) -> ShownScene:
     """Prepare ``scene`` and load its kernels. Raises ``ValueError`` for a scene that cannot be shown."""
     expect(any(i.faces for i in scene.instances), "scene", "at least one face", "none")
     threads = available_threads()
-    prepared = prepare_scene(scene, _needs(scene), "octree", "midpoint", threads)
+    prepared = prepare_scene(scene, _needs(scene), "octree", SPLIT, threads)
     prepared = replace(prepared, arrays=_lit(prepared.arrays, scene, prepared.needs))
     # The first call of a kernel loads or compiles it; the first picture should not wait for that.
     few = {"resolution": (8, 8), "samples": 1, "max_rays": 1}

@@ -388,14 +388,14 @@ def test_render_and_prepare_hand_on_their_options(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(preparing.Octree, "from_mesh", watched)
     monkeypatch.setattr(preparing, "for_chunks", chunks)
     more = replace(needs_of(scene), octree=True, refraction=True)
-    options: dict[str, Any] = {"accelerator": "octree", "split": "sah", "needs": more, "threads": 3}
+    options: dict[str, Any] = {"accelerator": "octree", "split": "midpoint", "needs": more, "threads": 3}
     ready = prepare(scene, **options)
     assert ready.needs == more and prepare(scene).needs == needs_of(scene) != more
     render(scene, resolution=SIZE, **options)
     render(scene, resolution=SIZE, accelerator="octree")
     render(ready, resolution=SIZE, threads=2)
-    assert [one for one in built if one[0] == "sah"] == [("sah", 3)] * 2
-    assert workers == [3, available_threads(), 2] and built[-1] == ("midpoint", available_threads())
+    assert [one for one in built if one[0] == "midpoint"] == [("midpoint", 3)] * 2
+    assert workers == [3, available_threads(), 2] and built[-1] == ("sah", available_threads())
 
 
 # Commands
@@ -446,7 +446,7 @@ def test_what_the_command_is_told_is_handed_on_and_the_rest_left_to_the_library(
     monkeypatch.setattr(import_module("renderer.picture.render"), "render", noting)
     monkeypatch.chdir(tmp_path)
     command = ["render", str(STAIRS), "--quiet"]
-    given = {"max_depth": 7, "samples": 9, "min_weight": 0.25, "max_rays": 99, "accelerator": "brute", "split": "sah",
+    given = {"max_depth": 7, "samples": 9, "min_weight": 0.25, "max_rays": 99, "accelerator": "brute", "split": "midpoint",
              "threads": 5}  # fmt: skip
     # The ends of their ranges: 0 is a value like any other, not one that was left out.
     ends: list[dict[str, Any]] = [{"max_depth": 0, "min_weight": 0.0}, {"max_depth": 64, "min_weight": 1.0}]
@@ -454,7 +454,7 @@ def test_what_the_command_is_told_is_handed_on_and_the_rest_left_to_the_library(
         flags = [word for name, value in options.items() for word in (f"--{name.replace('_', '-')}", str(value))]
         assert main([*command, *flags, "--resolution", "30X20"]) == 0
     assert main(command) == 0
-    left = {**dict.fromkeys(given), "accelerator": "auto", "split": "midpoint"}
+    left = {**dict.fromkeys(given), "accelerator": "auto", "split": "sah"}
     expected = [
         *({**left, **options, "resolution": (30, 20)} for options in (given, *ends)),
         {**left, "resolution": None},
@@ -480,9 +480,9 @@ def test_the_command_shows_a_scene_on_this_machine_at_any_free_port(
 
 
 @pytest.mark.judges("octree-render info --split")
-def test_info_cuts_the_octree_at_midpoints_unless_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_info_cuts_the_octree_by_area_unless_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["info", str(STAIRS)]) == 0
-    assert "octree (midpoint): " in capsys.readouterr().out
+    assert "octree (sah): " in capsys.readouterr().out
 
 
 def asked(url: str) -> int:

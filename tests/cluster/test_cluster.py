@@ -41,7 +41,7 @@ def test_a_study_on_workers_has_the_bits_of_one_process(client: Any, octree: Oct
     assert there.plan.parts > 10 and there.joined().tobytes() == expected.tobytes()
     places = face_points(octree.mesh)
     assert study.evaluate(octree, places).tobytes() == expected.tobytes()
-    other = run_on(client, octree, study, places, tmp_path / "other", size=SIZE * 4, split="sah")
+    other = run_on(client, octree, study, places, tmp_path / "other", size=SIZE * 4, split="midpoint")
     assert 1 < other.plan.parts < there.plan.parts and other.joined().tobytes() == expected.tobytes()
 
 

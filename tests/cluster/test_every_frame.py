@@ -30,7 +30,7 @@ ARGUMENTS: dict[str, Any] = {
     "planes": ("depth", "rays"),
     **SETTINGS,
 }
-BITLESS = {"accelerator": "brute", "split": "sah", "progress": True}
+BITLESS = {"accelerator": "brute", "split": "midpoint", "progress": True}
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +117,7 @@ def test_an_argument_gives_the_picture_that_render_gives_with_it(
     for plane in PLANES:
         assert getattr(found, plane).tobytes() == getattr(expected, plane).tobytes(), plane
     assert found.cut == expected.cut
-    usual = {"accelerator": "auto", "split": "midpoint"}
+    usual = {"accelerator": "auto", "split": "sah"}
     assert prepared[0][2:] == tuple((usual | given)[key] for key in usual)
 
 

@@ -10,12 +10,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from renderer.arguments.types import Split
 from renderer.mesh.load import load_mesh
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere, torus
@@ -49,12 +50,12 @@ class ClosedMesh(NamedTuple):
 class BuildOptions(NamedTuple):
     """Options of ``Octree``."""
 
-    split: Literal["midpoint", "sah"]
+    split: Split
     leaf_size: int
     max_depth: int
 
 
-SPLITS: tuple[Literal["midpoint", "sah"], ...] = ("midpoint", "sah")
+SPLITS: tuple[Split, ...] = get_args(Split)
 BUILDS = tuple(BuildOptions(*options) for options in product(SPLITS, (1, 4, 32), (1, 8, 32)))
 
 

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from renderer.arguments.types import SPLIT
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from validation.benchmark.peers import ours
@@ -24,7 +25,7 @@ def measure(mesh: Mesh, systems: Sequence[System], step: Callable[[str], None]) 
     calls = {system.name: _build_clock(system, mesh) for system in contenders} | {REFIT: _refit_clock(mesh)}
     runs = _LARGE_RUNS if len(mesh.faces) > _LARGE else RUNS
     seconds = interleaved(calls, runs)
-    own = f"{ours.OURS}_midpoint"
+    own = f"{ours.OURS}_{SPLIT}"
     return {
         "mesh": mesh.name,
         "faces": len(mesh.faces),

@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from renderer.arguments.types import SPLIT
 from renderer.checkpoints import study as runs
 from renderer.checkpoints.parts import Parts, digest_of
-from renderer.cli.study import SPLIT
 from renderer.cluster import connected, run_on
 from renderer.cluster.workers import SentMesh
 from renderer.errors import expect
@@ -53,20 +53,20 @@ class Compared:
     """The sky view factor of a mesh's faces, by this process and by clusters, which keep their parts in ``folder``."""
 
     def __init__(self, mesh: Mesh, folder: Path) -> None:
-        self.mesh, self.folder, self.sent = mesh, folder, Octree.from_mesh(mesh, split=SPLIT)
+        self.mesh, self.folder, self.sent = mesh, folder, Octree.from_mesh(mesh)
         self.points, self.study = on_faces(self.sent).points, runs.Study("sky", {"up": (0.0, 1.0, 0.0)})
         self._meshes_sent = 0
 
     def calls(self, threads: int, client: Any) -> dict[str, Callable[[], float]]:
         """The seconds of each of ``ROWS``, on so many threads or the workers of ``client``."""
-        tree = Octree.from_mesh(self.mesh, split=SPLIT, threads=threads)
+        tree = Octree.from_mesh(self.mesh, threads=threads)
         sent = SentMesh(digest_of(self.mesh.vertices), self.mesh.vertices, self.mesh.faces, SPLIT)
         return {
             "call": timed(self.study.evaluate, tree, self.points),
             "run": lambda: self._seconds(lambda folder: runs.run(tree, self.study, self.points, folder)),
             "built": lambda: self._on_new_mesh(client),
             "workers": lambda: self._on(client),
-            "tree": timed(lambda: Octree.from_mesh(self.mesh, split=SPLIT, threads=threads)),
+            "tree": timed(lambda: Octree.from_mesh(self.mesh, threads=threads)),
             "send": timed(lambda: client.scatter(sent, broadcast=True, hash=False)),
         }
 
@@ -75,11 +75,11 @@ class Compared:
         self._meshes_sent += 1
         more = np.repeat(self.mesh.vertices[:1], self._meshes_sent, axis=0)
         mesh = Mesh(np.concatenate([self.mesh.vertices, more]), self.mesh.faces)
-        self.sent = Octree.from_mesh(mesh, split=SPLIT)
+        self.sent = Octree.from_mesh(mesh)
         return self._on(client)
 
     def _on(self, client: Any) -> float:
-        return self._seconds(lambda folder: run_on(client, self.sent, self.study, self.points, folder, split=SPLIT))
+        return self._seconds(lambda folder: run_on(client, self.sent, self.study, self.points, folder))
 
     def _seconds(self, run: Callable[[Path], Parts]) -> float:
         """Seconds until the result is in memory."""

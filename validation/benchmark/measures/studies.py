@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.cli.study import SPLIT
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.ordering.morton import order_along_curve
@@ -141,7 +140,7 @@ def measure(form: str, faces: int, count: int, threads: int, step: Callable[[str
     """One row: seconds of ours (the median) and of each peer (its best way), differing bits, rates and memory."""
     of = views(form, faces, count)
     step(f"{form}: octree")
-    octree = Octree.from_mesh(of.mesh, split=SPLIT, threads=threads)
+    octree = Octree.from_mesh(of.mesh, threads=threads)
     of.first(_WARM).hidden(octree, threads)
     bits, ours, times, peers = of.hidden(octree, threads), timed(of.hidden, octree, threads), [], {}
     for label, test in testers(of.mesh, threads).items():
@@ -204,7 +203,7 @@ def memory(form: str, faces: int, count: int, threads: int) -> int:
 def grow(form: str, faces: str, count: str, threads: str) -> None:
     """Entry point of the child process of ``memory``: print the bytes."""
     of = views(form, int(faces), int(count))
-    octree = Octree.from_mesh(of.mesh, split=SPLIT)
+    octree = Octree.from_mesh(of.mesh)
     of.first(_WARM).hidden(octree, int(threads))
     before = resident()
     of.hidden(octree, int(threads))

@@ -5,10 +5,11 @@ One thread, so that what is compared is work and not its sharing. What float32 s
 """
 
 from collections.abc import Callable
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
+from renderer.arguments.types import SPLIT, Split
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.results.hits import Hits
@@ -17,7 +18,7 @@ from validation.error_curves import front
 from validation.hits.rays import RayFamily, camera_rays, random_rays
 from validation.timing import RUNS, median_seconds, timed
 
-SPLITS: tuple[Literal["midpoint", "sah"], ...] = ("midpoint", "sah")
+SPLITS: tuple[Split, ...] = get_args(Split)
 LEAF_SIZES = DEPTHS = (1, 2, 4, 8, 16, 32)
 # Levels of the icosphere and rays of a family, in full and in quick runs.
 LEVEL, QUICK_LEVEL, RAYS, QUICK_RAYS = 6, 4, 50_000, 10_000
@@ -27,7 +28,7 @@ _SEED = 20
 class TreeOptions(NamedTuple):
     """Options of an octree."""
 
-    split: Literal["midpoint", "sah"] = "midpoint"
+    split: Split = SPLIT
     leaf_size: int = 4
     max_depth: int = 32
 

@@ -34,7 +34,7 @@ scenes            instances, faces: of the large scene, which has bytes an insta
   rows[]          scene, instances, faces, rays, family, hit_share; by contender: differing (rays that one of both
                   misses), contenders: seconds, median; ratios: theirs over ours, of octree (the same faces) and
                   mitsuba_instances
-builds[]          mesh, faces, contenders: seconds, median; ratios: theirs over ours_midpoint; ratios_refit: the build
+builds[]          mesh, faces, contenders: seconds, median; ratios: theirs over ours_sah; ratios_refit: the build
                   of each peer over our refit
 memory[]          mesh, faces, systems: rest, peak (bytes by which a process grows), own (our own count or null)
 frames            scene, size, max_depth, faces, labels, contenders, ratios, rays (by contender), pictures: ssim,
