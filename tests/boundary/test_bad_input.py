@@ -538,7 +538,7 @@ PREPARED = renderer.prepare(SCENE)
 
 @cases(
     ("name", "bad"),
-    [("accelerator", "octree"), ("split", "sah"), ("needs", needs_of(SCENE)), ("camera", SCENE), ("samples", 3)],
+    [("accelerator", "octree"), ("split", "midpoint"), ("needs", needs_of(SCENE)), ("camera", SCENE), ("samples", 3)],
 )
 def test_what_a_prepared_scene_cannot_change_is_refused(name: str, bad: Any) -> None:
     with pytest.raises(ValueError, match=rf"^{name}: expected .*, got "):
