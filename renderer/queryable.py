@@ -176,7 +176,7 @@ class Queries:
         """
         built = self._built
         rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving, side)
-        return any_hits(built.tree, rays, self.threads).reshape(shape)
+        return any_hits(built.tree, rays, built.mesh, self.threads).reshape(shape)
 
     def all_hits(
         self,

@@ -70,11 +70,11 @@ def gather_chunk(descriptor, rays, begin, end, choice, counts, doubles, integers
     out of range, for which nothing is gathered, or -1.
     """
     tree = tree_pointers(descriptor)
-    source, found = ray_pointers(rays, tree.scale), Found(pointer(doubles), pointer(integers), doubles.shape[1])
+    source, found = ray_pointers(*rays, tree.scale), Found(pointer(doubles), pointer(integers), doubles.shape[1])
     bad, kept = first_bad_ray(source, begin, end), np.int64(0)
     if bad >= 0:
         return begin, bad
-    memory = scratch_pointers(scratch)
+    memory = scratch_pointers(scratch, source.starts)
     candidates = make_candidates(memory.waiting)
     hits, rounds = np.int64(0), np.int64(0)
     # Where the candidates of rays were found, they are used: only hits end it between such rays.

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
+from renderer.jit.kinds import of_kind
 from renderer.materials.registry import reflected_light
 from renderer.numerics.simd import load, minimum, pointer
 from renderer.numerics.vec3 import add, barycentric, dot, largest_component, normalized, row3, scale, sub
@@ -13,7 +14,6 @@ from renderer.shade.faces import MERGED, PLACED, FaceWays
 from renderer.shade.looks import PLAIN, TEXTURED, LookWays
 from renderer.trace.instances import scene_pointers as instance_pointers
 from renderer.trace.spawn import Facet, facet_of, offset_distance
-from renderer.trace.trees import of_kind
 
 # The most media that a ray remembers to be in. A ninth is not remembered; leaving it then leads back into the eighth.
 MAX_MEDIA = 8

@@ -27,6 +27,7 @@ from renderer.shade.whitted import (
 )
 from renderer.trace.layout import cache_aligned
 from renderer.trace.spawn import put_no_start
+from renderer.trace.starts.record import ON_SURFACE
 from renderer.trace.traverse import Scratch, new_scratch, scratch_pointers
 from renderer.trace.trees import tree_pointers
 
@@ -288,7 +289,7 @@ def render_tile(descriptor, scene, settings, camera, film, tile, arrays):
     """
     doubles, integers, hits = pointer(arrays.doubles), pointer(arrays.integers), pointer(arrays.hits)
     state, total = pointer(arrays.state), pointer(arrays.total)
-    scratch = bundle_scratch(doubles, integers, hits, settings, scratch_pointers(arrays.trace))
+    scratch = bundle_scratch(doubles, integers, hits, settings, scratch_pointers(arrays.trace, ON_SURFACE))
     tree, seen = tree_pointers(descriptor), scene_pointers(scene)
     listed = camera.rays.shape[1] == 6
     places, weights = pointer(camera.places), pointer(camera.weights)

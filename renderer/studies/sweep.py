@@ -36,6 +36,7 @@ from renderer.trace.starts.record import (
     EDGE,
     FACE,
     KNOWN,
+    ON_SURFACE,
     ROW,
     SLACK,
     WAY,
@@ -175,7 +176,7 @@ def _scratch_pointers(arrays, vertices, faces):
     return _SweepPointers(
         doubles, integers, origins, directions, limits, starts, values, zero, offset(integers, _POINT_INTEGERS),
         pointer(vertices), pointer(faces),
-        hit_pointers(arrays.hits, 0), scratch_pointers(arrays.trace), parallel_pointers(arrays.parallel),
+        hit_pointers(arrays.hits, 0), scratch_pointers(arrays.trace, ON_SURFACE), parallel_pointers(arrays.parallel),
     )  # fmt: skip
 
 

@@ -20,6 +20,7 @@ from renderer.trace.starts.record import ALL, FACE, FACES, HEAD, IGNORED, MASK, 
 # Ctrl-C, large enough that taking a chunk costs nothing beside its 1 to 10 ms of tracing.
 CHUNK = 8192
 
+_FLOAT64 = np.dtype(np.float64)
 _MOST = float(np.finfo(np.float64).max)
 
 
@@ -58,8 +59,9 @@ def _no_starts() -> NDArray[np.int64]:
     return starts
 
 
-# The starts of rays that start on no surface.
+# The starts of rays that start on no surface; and for kernels that are compiled apart for such rays.
 NO_STARTS = _no_starts()
+ALONE = np.zeros(1, np.uint64)
 
 
 class RayBatch(NamedTuple):
@@ -97,6 +99,10 @@ def check_rays(
     ``starts`` has the shapes of ``leaving`` and ``side``. Whether each ray is in range is checked when it is traced.
     Raises ``ValueError`` naming the argument and, for a bad bound, its row.
     """
+    # Rays as most calls have them, for the sake of calls with few rays.
+    if _is_plain(origins) and _is_plain(directions) and origins.shape == directions.shape and not starts:
+        if type(t_min) is type(t_max) is float and t_min == 0.0 and t_max == np.inf:
+            return RayBatch(origins, directions, _ZERO, _INFINITY), origins.shape[:1]
     origins, directions = _vectors("origins", origins), _vectors("directions", directions)
     # The usual bounds share arrays.
     low = None if type(t_min) is float and t_min == 0.0 else real_argument("t_min", t_min)
@@ -163,10 +169,10 @@ def _rows(array: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
 
 
 def _is_plain(values: ArrayLike) -> TypeGuard[NDArray[np.float64]]:
-    """Whether it is an (n, 3) array of float64, as most are; a quick check for calls with few rays."""
-    if not (type(values) is np.ndarray and values.dtype == np.float64 and values.ndim == 2):
+    """Whether it is an (n, 3) array of float64 that kernels take as it is."""
+    if not (type(values) is np.ndarray and values.dtype is _FLOAT64 and values.ndim == 2):
         return False
-    return values.shape[1] == 3
+    return values.shape[1] == 3 and values.flags.carray
 
 
 def check_faces(argument: str, faces: ArrayLike, shape: tuple[int, ...], most: int) -> NDArray[np.int64]:

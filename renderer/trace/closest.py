@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh
 from renderer.results.hits import Hits
 from renderer.system.threads import for_chunks
-from renderer.trace.batch import CHUNK, NO_STARTS, RayBatch, reject
+from renderer.trace.batch import ALONE, CHUNK, NO_STARTS, RayBatch, reject
 from renderer.trace.layout import BLOCK_FACES, Tree
 from renderer.trace.ray_lanes import WIDTH
 from renderer.trace.rays import HIT_ROWS
@@ -29,42 +29,42 @@ _NO_HOLDERS = np.empty(1, np.int64)
 
 def closest_hits(tree: Tree, rays: RayBatch, mesh: Mesh, threads: int) -> Hits:
     """Closest hits of a batch."""
-    if _are_few(tree, rays):
-        out = _trace_few(tree, rays)
-    else:
-        out = np.empty((HIT_ROWS, rays.number))
-        _run(tree, rays, out, threads, any_hit=False)
+    count = rays.number
+    if count <= FEW and 0 < tree.depth <= FEW_DEPTH:
+        return _trace_few(tree, rays, count, mesh)
+    out = np.empty((HIT_ROWS, count))
+    _run(tree, rays, out, threads, any_hit=False)
     t, u, v, face, side, pile = out
     return Hits(t, face.view(np.int64), u, v, mesh, None, side.view(np.int64), pile.view(np.int64))
 
 
-def any_hits(tree: Tree, rays: RayBatch, threads: int) -> NDArray[np.bool_]:
+def any_hits(tree: Tree, rays: RayBatch, mesh: Mesh, threads: int) -> NDArray[np.bool_]:
     """Whether each ray of a batch hits anything."""
-    if _are_few(tree, rays):
-        return _trace_few(tree, rays)[3].view(np.int64) >= 0
+    count = rays.number
+    if count <= FEW and 0 < tree.depth <= FEW_DEPTH:
+        return _trace_few(tree, rays, count, mesh).face >= 0
     # In whole words, so that kernels are compiled for one kind of output.
-    out = np.empty((1, -(-rays.number // 8)))
+    out = np.empty((1, -(-count // 8)))
     _run(tree, rays, out, threads, any_hit=True)
-    return out.view(np.bool_)[0, : rays.number]
+    return out.view(np.bool_)[0, :count]
 
 
-def _are_few(tree: Tree, rays: RayBatch) -> bool:
-    """Whether the rays are traced one by one."""
-    return tree.has_nodes and rays.number <= FEW and tree.depth <= FEW_DEPTH
-
-
-def _trace_few(tree: Tree, rays: RayBatch) -> NDArray[np.float64]:
-    """Closest hits of a few rays on the caller's thread, as ``single.trace_few`` writes them."""
-    out = np.empty((HIT_ROWS, rays.number))
-    if rays.starts is NO_STARTS:
-        row = trace_few(tree.descriptor, rays, out, _NO_HOLDERS)
-    else:
-        scratch = _take_scratch(tree.depth)
-        row = trace_few(tree.descriptor, rays, out, scratch.holders)
+def _trace_few(tree: Tree, rays: RayBatch, count: int, mesh: Mesh) -> Hits:
+    """Closest hits of a few rays on the caller's thread, in arrays of their own: rows of one would take longer."""
+    t, u, v = np.empty(count), np.empty(count), np.empty(count)
+    face, side, pile = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count, np.int64)
+    origins, directions, t_min, t_max, starts = rays
+    alone = starts is NO_STARTS
+    scratch = None if alone else _take_scratch(tree.depth)
+    row = trace_few(
+        tree.descriptor, origins, directions, t_min, t_max, ALONE if alone else starts, t, face, u, v, side, pile,
+        _NO_HOLDERS if scratch is None else scratch.holders,
+    )  # fmt: skip
+    if scratch is not None:
         _local.scratch = scratch
     if row >= 0:
         reject(rays, row, tree.scale)
-    return out
+    return Hits(t, face, u, v, mesh, None, side, pile)
 
 
 def rays_against_blocks(tree: Tree) -> int:
@@ -77,7 +77,8 @@ def _run(tree: Tree, rays: RayBatch, out: NDArray[np.float64], threads: int, any
     size = min(CHUNK, max(_LEAST_CHUNK, count // (16 * threads)))
     if not tree.has_nodes:
         size = min(size, rays_against_blocks(tree))
-    bad: list[int] = []
+    bad, starts = list[int](), ALONE if rays.starts is NO_STARTS else rays.starts
+    given = (*rays[:-1], starts)
 
     def trace(begin: int, end: int) -> Iterator[None]:
         # Only chunks after a bad ray are left out, so the first bad ray is always found.
@@ -85,14 +86,14 @@ def _run(tree: Tree, rays: RayBatch, out: NDArray[np.float64], threads: int, any
             return
         if not tree.has_nodes:
             scratch = _take_scratch(tree.depth)
-            row = search_chunk(tree.descriptor, rays, out, begin, end, any_hit, scratch.holders)
+            row = search_chunk(tree.descriptor, *given, out, begin, end, any_hit, scratch.holders)
             _local.scratch = scratch
             if row >= 0:
                 bad.append(row)
             return
         scratch, progress = _take_scratch(tree.depth), Progress(begin, 0, 0)
         while progress.begin < end or progress.following < progress.count:
-            *reached, row = trace_chunk(tree.descriptor, rays, out, progress, end, any_hit, scratch)
+            *reached, row = trace_chunk(tree.descriptor, *given, out, progress, end, any_hit, scratch)
             progress = Progress(*reached)
             if row >= 0:
                 bad.append(row)

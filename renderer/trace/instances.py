@@ -63,7 +63,7 @@ from renderer.trace.ray_lanes import (
 )
 from renderer.trace.rays import ray_at
 from renderer.trace.stack_entry import child_of_entry, distance_of, octant_of
-from renderer.trace.starts.record import IGNORED, MASK
+from renderer.trace.starts.record import start_row
 from renderer.trace.stream import END, prefetch_block, prefetch_node
 from renderer.trace.ways import Ways
 
@@ -464,11 +464,11 @@ def _slab_within(instance, middle, axis, p, ray, largest, far):
 
 @inlined
 def _begin(tree, rays, prepared, r, number):
-    row = offset(rays.starts.rows, number * rays.starts.step)
+    _, _, mask, ignored = start_row(rays.starts, number)
     store(prepared.integers, _INSTANCE + r, 0)
     store(prepared.integers, _NODES_AT + r, tree.top)
-    store(prepared.integers, _MASK + r, np.int64(load(row, MASK)))
-    store(prepared.integers, _IGNORED + r, np.int64(load(row, IGNORED)))
+    store(prepared.integers, _MASK + r, np.int64(mask))
+    store(prepared.integers, _IGNORED + r, np.int64(ignored))
 
 
 @inlined

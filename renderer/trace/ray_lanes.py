@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined
+from renderer.jit.kinds import of_number
 from renderer.numerics.simd import broadcast_like, load, narrow, select, store
 from renderer.trace.best import NO_FACE, Best
 from renderer.trace.intersect import Shear, Slabs, box_limit, largest_of, make_shear, make_slabs, round_down
@@ -48,11 +49,13 @@ CHILD, TOP, NUMBER, UNRESOLVED = 7 * WIDTH, 8 * WIDTH, 9 * WIDTH, 10 * WIDTH
 
 
 class Prepared(NamedTuple):
-    """Pointers to groups of rays: float32, float64 and int64."""
+    """Pointers to groups of rays: float32, float64 and int64; and NO_SURFACE or else, as ``RayPointers``
+    has it."""
 
     floats: Any
     doubles: Any
     integers: Any
+    starts: Any
 
 
 @inlined
@@ -86,11 +89,37 @@ def prepare_ray(rays, r, ray, t_max):
     store(doubles, DIRECTION_Z + r, shear.direction_z)
     store(doubles, T_MIN + r, ray.t_min)
     store(doubles, LARGEST + r, largest)
-    store(doubles, SLACK + r, ray.slack)
-    store(doubles, LEAVING + r, ray.leaving)
+    of_number(rays.starts, _put_no_start, _put_start)(doubles, r, ray)
     _put_axes(integers, BLOCK_ROW + r, shear.row_x, shear.row_y, shear.row_z)
     store(doubles, T + r, t_max)
     store(integers, FACE + r, broadcast_like(np.int64(NO_FACE), t_max))
+
+
+@inlined
+def _put_no_start(doubles, r, ray):
+    pass
+
+
+@inlined
+def _put_start(doubles, r, ray):
+    store(doubles, SLACK + r, ray.slack)
+    store(doubles, LEAVING + r, ray.leaving)
+
+
+@inlined
+def start_of(rays, r):
+    """The ray's slack, and the face that it starts on."""
+    return of_number(rays.starts, _no_start, _start_in_lane)(rays.doubles, r)
+
+
+@inlined
+def _no_start(doubles, r):
+    return 0.0, -1.0
+
+
+@inlined
+def _start_in_lane(doubles, r):
+    return load(doubles, SLACK + r), load(doubles, LEAVING + r)
 
 
 @inlined
@@ -143,7 +172,7 @@ def shear_of(rays, r):
         load(integers, BLOCK_ROW + r), load(integers, BLOCK_ROW + WIDTH + r), load(integers, BLOCK_ROW + 2 * WIDTH + r),
         load(doubles, ORIGIN + r), load(doubles, ORIGIN + WIDTH + r), load(doubles, ORIGIN + 2 * WIDTH + r),
         load(doubles, SHEAR + r), load(doubles, SHEAR + WIDTH + r), load(doubles, DIRECTION_Z + r),
-        load(doubles, SLACK + r), load(doubles, LEAVING + r),
+        *start_of(rays, r),
     )  # fmt: skip
 
 

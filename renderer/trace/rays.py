@@ -6,9 +6,11 @@ import numpy as np
 
 from renderer.arguments.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.jit.decorators import inlined, kernel
+from renderer.jit.kinds import of_number
 from renderer.numerics.simd import (
     address,
     bool_pointer,
+    broadcast_like,
     fabs,
     float64_pointer,
     gather8,
@@ -25,7 +27,7 @@ from renderer.numerics.simd import (
 )
 from renderer.trace.best import NO_FACE, side_of
 from renderer.trace.intersect import Ray
-from renderer.trace.starts.record import ALL, FACE, IGNORED, MASK, SLACK, StartPointers, start_pointers
+from renderer.trace.starts.record import ALL, FACE, SLACK, start_pointers, start_row
 
 _MOST, _TINIEST = np.finfo(np.float64).max, 2.0**-1074
 _BYTES = 8
@@ -37,7 +39,7 @@ class RayPointers(NamedTuple):
     """Pointers to rows of origins and directions, and to t_min and t_max.
 
     Each has a step from one ray to the next, 0 where all share one. ``scale`` is the tree's, a power of two, so t is
-    converted exactly. ``starts`` has the rays that start on the surface.
+    converted exactly. ``starts`` are those of the rays that start on the surface, or ``NO_SURFACE``.
     """
 
     origins: Any
@@ -49,7 +51,7 @@ class RayPointers(NamedTuple):
     min_step: int
     max_step: int
     scale: float
-    starts: StartPointers
+    starts: Any
 
 
 class HitPointers(NamedTuple):
@@ -67,9 +69,8 @@ class HitPointers(NamedTuple):
 
 
 @inlined
-def ray_pointers(rays, scale):
-    """``RayPointers`` of a ``RayBatch``."""
-    origins, directions, t_min, t_max, starts = rays
+def ray_pointers(origins, directions, t_min, t_max, starts, scale):
+    """``RayPointers`` of the arrays of a ``RayBatch``."""
     return RayPointers(
         pointer(origins), pointer(directions), pointer(t_min), pointer(t_max),
         3 * np.int64(len(origins) > 1), 3 * np.int64(len(directions) > 1), np.int64(len(t_min) > 1),
@@ -139,10 +140,9 @@ def ray_at(rays, i):
     """Ray ``i`` in the tree's units, and its t_max."""
     o, d = offset(rays.origins, i * rays.origin_step), offset(rays.directions, i * rays.direction_step)
     origin, direction = (load(o, 0), load(o, 1), load(o, 2)), (load(d, 0), load(d, 1), load(d, 2))
-    row = offset(rays.starts.rows, i * rays.starts.step)
     return _scaled(
         origin, direction, load(rays.t_min, i * rays.min_step), load(rays.t_max, i * rays.max_step), rays.scale,
-        load(row, SLACK), load(row, FACE), load(row, MASK), load(row, IGNORED),
+        *start_row(rays.starts, i),
     )  # fmt: skip
 
 
@@ -154,7 +154,9 @@ def eight_rays_at(rays, numbers):
     direction = gather8(d, numbers, z, 0), gather8(d, numbers, z, 1), gather8(d, numbers, z, 2)
     # rule: ends-of-eight
     t_min, t_max = _often_one(rays.t_min, numbers, rays.min_step, 0), _often_one(rays.t_max, numbers, rays.max_step, 0)
-    return _scaled(origin, direction, t_min, t_max, rays.scale, *starts8(rays.starts, numbers), ALL, -1.0)
+    slack, leaving = of_number(rays.starts, _no_starts8, starts8)(rays.starts, numbers)
+    slack, leaving = broadcast_like(slack, t_min), broadcast_like(leaving, t_min)
+    return _scaled(origin, direction, t_min, t_max, rays.scale, slack, leaving, ALL, -1.0)
 
 
 @inlined
@@ -162,6 +164,11 @@ def _often_one(base, numbers, step, column):
     """``gather8`` for rows that all rays often share."""
     first = gather8(base, numbers, 0, column)
     return gather8(base, numbers, step, column) if step != 0 else first
+
+
+@inlined
+def _no_starts8(starts, numbers):
+    return 0.0, -1.0
 
 
 @inlined

@@ -3,11 +3,22 @@
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import LOCAL_WORDS, is_negative, load, local_words, offset, pointer, store
+from renderer.jit.kinds import of_number
+from renderer.numerics.simd import (
+    LOCAL_WORDS,
+    address,
+    bool_pointer,
+    is_negative,
+    load,
+    local_words,
+    offset,
+    pointer,
+    store,
+)
 from renderer.trace.best import NO_FACE, Best, no_hit
 from renderer.trace.intersect import largest_of, make_shear
 from renderer.trace.leaf import nearest_carefully
-from renderer.trace.rays import first_bad_ray, hit_pointers, ray_at, ray_pointers, write_hit
+from renderer.trace.rays import HitPointers, first_bad_ray, ray_at, ray_pointers, write_hit
 from renderer.trace.single_ray import Found, enter_counted, prepare_single
 from renderer.trace.starts.record import PILE
 from renderer.trace.starts.search import is_near_start, search_from, t_from
@@ -43,8 +54,18 @@ def search_carefully(tree, rays, i, stack, holders, any_hit):
     hit.
     """
     ray, t_max = ray_at(rays, i)
+    return of_number(rays.starts, _search_alone, _search)(tree, rays.starts, i, ray, t_max, stack, holders, any_hit)
+
+
+@inlined
+def _search_alone(tree, starts, i, ray, t_max, stack, holders, any_hit):
+    return search_singly(tree, ray, t_max, stack)
+
+
+@inlined
+def _search(tree, starts, i, ray, t_max, stack, holders, any_hit):
     if ray.leaving >= 0.0:
-        return search_from(tree, rays.starts, i, ray, t_max, stack, holders, any_hit)
+        return search_from(tree, starts, i, ray, t_max, stack, holders, any_hit)
     return search_singly(tree, ray, t_max, stack)
 
 
@@ -55,6 +76,16 @@ def write_best(tree, rays, found, i, best, slack, largest, dz, any_hit):
     ``slack`` is the ray's, ``largest`` the largest component of its direction: for a near hit, the move of the origin
     is a part of t.
     """
+    of_number(rays.starts, _write_alone, _write)(tree, rays, found, i, best, slack, largest, dz, any_hit)
+
+
+@inlined
+def _write_alone(tree, rays, found, i, best, slack, largest, dz, any_hit):
+    write_hit(found, i, rays.scale, best, dz, any_hit)
+
+
+@inlined
+def _write(tree, rays, found, i, best, slack, largest, dz, any_hit):
     if not any_hit and is_near_start(slack, best.t * largest):
         best = count_from_start(tree, rays, i, best)
     write_hit(found, i, rays.scale, best, dz, any_hit)
@@ -72,14 +103,17 @@ def count_from_start(tree, rays, i, best):
 
 
 @kernel
-def trace_few(descriptor, rays, out, holders):
-    """Closest hits of a few rays, one by one, into the rows of ``out``, see ``hit_pointers``.
+def trace_few(descriptor, origins, directions, t_min, t_max, starts, t, face, u, v, side, pile, holders):
+    """Closest hits of a few rays of a ``RayBatch``, one by one, as ``HitPointers`` have them.
 
     Returns the row of the first ray out of range, for which nothing is traced, or -1. The tree has at most FEW_DEPTH
     levels.
     """
-    tree, count = tree_pointers(descriptor), out.shape[1]
-    source, found = ray_pointers(rays, tree.scale), hit_pointers(out, count)
+    tree, count = tree_pointers(descriptor), len(t)
+    source = ray_pointers(origins, directions, t_min, t_max, starts, tree.scale)
+    found = HitPointers(
+        pointer(t), pointer(face), pointer(u), pointer(v), pointer(side), pointer(pile), bool_pointer(address(t))
+    )
     bad = first_bad_ray(source, 0, count)
     if bad >= 0:
         return bad

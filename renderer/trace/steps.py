@@ -56,7 +56,8 @@ def _count_chunk(descriptor, rays, counts, stack, near, begin, end):
 
     Returns the ray before which it ended, early after _WORK, and the row of a ray out of range, or -1.
     """
-    tree, source = tree_pointers(descriptor), ray_pointers(rays, tree_pointers(descriptor).scale)
+    tree = tree_pointers(descriptor)
+    source = ray_pointers(*rays, tree.scale)
     bad, work = first_bad_ray(source, begin, end), np.int64(0)
     if bad < 0 and tree.has_nodes:
         waiting = _Waiting(pointer(stack), pointer(near), offset(pointer(near), len(stack)))

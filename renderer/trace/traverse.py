@@ -17,12 +17,12 @@ from renderer.trace.ray_lanes import (
     GROUP_STRIDE,
     LARGEST,
     NUMBER,
-    SLACK,
     UNRESOLVED,
     WIDTH,
     Prepared,
     best_of,
     prepare_eight,
+    start_of,
 )
 from renderer.trace.rays import HitPointers, RayPointers, first_bad_ray, hit_pointers, ray_at, ray_pointers
 from renderer.trace.single import search_carefully, write_best
@@ -92,14 +92,18 @@ def new_scratch(depth: int, rays: int) -> Scratch:
 
 
 @inlined
-def scratch_pointers(scratch):
-    """The ``ScratchPointers`` into a ``Scratch``."""
+def scratch_pointers(scratch, starts):
+    """The ``ScratchPointers`` into a ``Scratch``, for rays with ``starts``, or ON_SURFACE."""
     floats, doubles, integers = pointer(scratch.floats), pointer(scratch.doubles), pointer(scratch.integers)
     size, lane_integers = scratch.stack_size, offset(integers, GROUPS * GROUP_STRIDE)
     lanes = make_lanes(lane_integers, offset(doubles, GROUPS * GROUP_STRIDE), size)
     packet_stack = offset(lane_integers, LANE_INTEGERS + GROUPS * WIDTH * size)
     return ScratchPointers(
-        Prepared(floats, doubles, integers), lanes, packet_stack, offset(packet_stack, size), pointer(scratch.holders)
+        Prepared(floats, doubles, integers, starts),
+        lanes,
+        packet_stack,
+        offset(packet_stack, size),
+        pointer(scratch.holders),
     )
 
 
@@ -130,7 +134,7 @@ def _finish(tree, query, r):
     """
     rays, scratch, prepared = query.rays, query.scratch, query.scratch.prepared
     best, steps = best_of(prepared, r), np.int64(0)
-    i, slack = load(prepared.integers, NUMBER + r), load(prepared.doubles, SLACK + r)
+    i, (slack, _) = load(prepared.integers, NUMBER + r), start_of(prepared, r)
     # rule: resolve-uncertain
     if load(prepared.integers, UNRESOLVED + r) != 0 or slack == EDGE:
         stack = offset(scratch.lanes.stacks, stack_of(scratch.lanes, r))
@@ -281,8 +285,9 @@ def trace_rays(tree, rays, found, count, scratch, any_hit):
 
 
 @kernel
-def trace_chunk(descriptor, rays, out, progress, end, any_hit, scratch):
-    """Hits of rays up to ``end`` into ``out``: the rows of ``hit_pointers``, or with ``any_hit`` bools.
+def trace_chunk(descriptor, origins, directions, t_min, t_max, starts, out, progress, end, any_hit, scratch):
+    """Hits of the rays of a ``RayBatch`` up to ``end`` into ``out``: the rows of ``hit_pointers``, or with ``any_hit``
+    bools.
 
     ``descriptor`` is the tree's, which must have nodes. ``progress`` is (begin, 0, 0) in the first call for a chunk,
     then that of the last call, with the same scratch. A call with much work ends early; all is done at (end, n, n).
@@ -291,19 +296,21 @@ def trace_chunk(descriptor, rays, out, progress, end, any_hit, scratch):
     nothing is traced. Plain numbers, as Numba would call Python to make a named tuple, and crash if Ctrl-C came then.
     """
     tree = tree_pointers(descriptor)
-    source, found = ray_pointers(rays, tree.scale), hit_pointers(out, out.shape[1])
+    source = ray_pointers(origins, directions, t_min, t_max, starts, tree.scale)
+    found = hit_pointers(out, out.shape[1])
     bad = first_bad_ray(source, progress.begin, end)
     if bad < 0:
-        query = _Query(source, found, scratch_pointers(scratch), any_hit)
+        query = _Query(source, found, scratch_pointers(scratch, source.starts), any_hit)
         progress = _trace_on(tree, query, progress, end)
     return progress.begin, progress.following, progress.count, bad
 
 
 @kernel
-def search_chunk(descriptor, rays, out, begin, end, any_hit, holders):
+def search_chunk(descriptor, origins, directions, t_min, t_max, starts, out, begin, end, any_hit, holders):
     """Hits of the rays begin:end, as ``trace_chunk`` writes them, for a tree without nodes; returns the row or -1."""
     tree = tree_pointers(descriptor)
-    source, found = ray_pointers(rays, tree.scale), hit_pointers(out, out.shape[1])
+    source = ray_pointers(origins, directions, t_min, t_max, starts, tree.scale)
+    found = hit_pointers(out, out.shape[1])
     bad = first_bad_ray(source, begin, end)
     if bad < 0:
         search_blocks(tree, source, found, begin, end, pointer(holders), any_hit)

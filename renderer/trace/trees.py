@@ -2,10 +2,8 @@
 
 from typing import Any, NamedTuple
 
-from numba import types
-from numba.extending import intrinsic
-
 from renderer.jit.decorators import inlined
+from renderer.jit.kinds import of_kind
 from renderer.numerics.simd import double_of, float32_pointer, float64_pointer, int32_pointer, load, pointer
 from renderer.trace.best import admits_all, may_hit_all
 from renderer.trace.edge_signs import coordinate_of_block
@@ -59,14 +57,9 @@ def _mesh_pointers(descriptor):
     )  # fmt: skip
 
 
-@intrinsic
-def of_kind(typingctx, array, of_int64, of_others):
-    """One of two kernels, by the type of an array when the caller is compiled. Of scenes a descriptor has uint64."""
-    chosen = of_int64 if array.dtype == types.int64 else of_others
-    return chosen(array, of_int64, of_others), lambda context, builder, sig, args: context.get_dummy_value()
-
-
 @inlined
 def tree_pointers(descriptor):
-    """The pointers in ``Tree.descriptor``, or that of a scene, whose arrays the caller must keep alive."""
+    """The pointers in ``Tree.descriptor``, int64, or that of a scene, uint64, whose arrays the caller must keep
+    alive.
+    """
     return of_kind(descriptor, _mesh_pointers, scene_pointers)(descriptor)

@@ -167,8 +167,8 @@ from renderer.trace.traverse import new_scratch, scratch_pointers, trace
 @njit(error_model="numpy")
 def mine(descriptor, rays, out, memory):
     tree = tree_pointers(descriptor)
-    source, found = ray_pointers(rays, tree.scale), hit_pointers(out, len(rays[1]))
-    trace(tree, source, found, 0, len(rays[1]), scratch_pointers(memory), False)
+    source, found = ray_pointers(*rays, tree.scale), hit_pointers(out, len(rays[1]))
+    trace(tree, source, found, 0, len(rays[1]), scratch_pointers(memory, source.starts), False)
 
 octree, rays = Octree.load(sys.argv[1]), np.random.default_rng(0).normal(size=(50, 3)) * 3
 expected = octree.closest_hit(rays, -rays)

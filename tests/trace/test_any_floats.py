@@ -40,11 +40,11 @@ def unchecked(descriptor, rays, out, any_hit, memory, by_blocks):
     """``trace_chunk`` without its check of the rays."""
     tree = tree_pointers(descriptor)
     count = len(rays[1])
-    source, found = ray_pointers(rays, tree.scale), hit_pointers(out, count)
+    source, found = ray_pointers(*rays, tree.scale), hit_pointers(out, count)
     if by_blocks:
-        search_blocks(tree, source, found, 0, count, scratch_pointers(memory).holders, any_hit)
+        search_blocks(tree, source, found, 0, count, scratch_pointers(memory, source.starts).holders, any_hit)
     else:
-        trace(tree, source, found, 0, count, scratch_pointers(memory), any_hit)
+        trace(tree, source, found, 0, count, scratch_pointers(memory, source.starts), any_hit)
 
 
 def answers(octree, rays, any_hit, by_blocks=False):

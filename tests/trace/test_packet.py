@@ -88,7 +88,7 @@ def test_a_packet_that_gives_up_is_traced_all_the_same():
 @kernel
 def _prepare_both(rays, numbers, together, alone):
     floats, doubles, integers = together
-    source = ray_pointers(rays, 0.25)
+    source = ray_pointers(*rays, 0.25)
     prepare_eight(source, Prepared(pointer(floats), pointer(doubles), pointer(integers)), 8, pointer(numbers))
     floats, doubles, integers = alone
     for k in range(8):
@@ -113,7 +113,7 @@ def test_eight_rays_are_prepared_as_each_is_alone(seed):
 
 @kernel
 def _are_coherent(rays):
-    return are_coherent(ray_pointers(rays, 1.0), 0)
+    return are_coherent(ray_pointers(*rays, 1.0), 0)
 
 
 def _coherent(origins, directions):

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined
+from renderer.jit.kinds import of_kind, of_number
 from renderer.numerics.simd import address, float64_pointer, int32_pointer, load, offset, pointer
 from renderer.numerics.vec3 import row3, scale, three
 from renderer.trace.layout import MASK_BITS
@@ -48,9 +49,24 @@ class Start(NamedTuple):
     code: int
 
 
+# In place of ``StartPointers``: no ray starts on the surface, and each may hit every instance. And in place of those of
+# rays that may.
+NO_SURFACE, ON_SURFACE = 0, None
+
+
 @inlined
 def start_pointers(starts):
-    """``StartPointers`` of an array of starts: HEAD int64, and rows of ROW float64."""
+    """``StartPointers`` of an array of starts, HEAD int64 and rows of ROW float64; NO_SURFACE of one of uint64."""
+    return of_kind(starts, _pointers, _none)(starts)
+
+
+@inlined
+def _none(starts):
+    return NO_SURFACE
+
+
+@inlined
+def _pointers(starts):
     head = pointer(starts)
     return StartPointers(
         float64_pointer(address(starts) + 8 * HEAD),
@@ -58,6 +74,23 @@ def start_pointers(starts):
         float64_pointer(load(head, VERTICES)),
         int32_pointer(load(head, FACES)),
     )
+
+
+@inlined
+def start_row(starts, i):
+    """Slack, face, mask and ignored instance of ray ``i``."""
+    return of_number(starts, _usual_row, _own_row)(starts, i)
+
+
+@inlined
+def _usual_row(starts, i):
+    return 0.0, -1.0, ALL, -1.0
+
+
+@inlined
+def _own_row(starts, i):
+    row = offset(starts.rows, i * starts.step)
+    return load(row, SLACK), load(row, FACE), load(row, MASK), load(row, IGNORED)
 
 
 @inlined
