@@ -142,9 +142,9 @@ class Queries:
         built = self._built
         rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving, side)
         hits = closest_hits(built.tree, rays, built.mesh, self.threads)
-        if flag_argument("t_error", t_error):
+        if t_error is not False and flag_argument("t_error", t_error):
             add_errors(hits, rays, None, built.tree.scale, self.threads)
-        return hits.shaped(shape)
+        return hits if len(shape) == 1 else hits.shaped(shape)
 
     def any_hit(
         self,
@@ -176,7 +176,7 @@ class Queries:
         """
         built = self._built
         rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving, side)
-        return any_hits(built.tree, rays, built.mesh, self.threads).reshape(shape)
+        return any_hits(built.tree, rays, self.threads).reshape(shape)
 
     def all_hits(
         self,

@@ -16,7 +16,7 @@ from renderer.trace.edge_signs import coordinate, exact_sides
 from renderer.trace.intersect import face_in, hit_in, hit_triangles, make_shear
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.leaf import resolved_hit
-from renderer.trace.rays import HitPointers, first_bad_ray, ray_at, ray_pointers, write_hit
+from renderer.trace.rays import HitPointers, batch_pointers, first_bad_ray, ray_at, write_hit
 from renderer.trace.single_ray import SingleRay, enter_node, prepare_single
 from renderer.trace.starts.record import PILE, StartPointers
 from renderer.trace.starts.search import Departure, counted_from_start, depart, meet_near, near_bits, stopped_again
@@ -70,7 +70,7 @@ def gather_chunk(descriptor, rays, begin, end, choice, counts, doubles, integers
     out of range, for which nothing is gathered, or -1.
     """
     tree = tree_pointers(descriptor)
-    source, found = ray_pointers(*rays, tree.scale), Found(pointer(doubles), pointer(integers), doubles.shape[1])
+    source, found = batch_pointers(rays, tree.scale), Found(pointer(doubles), pointer(integers), doubles.shape[1])
     bad, kept = first_bad_ray(source, begin, end), np.int64(0)
     if bad >= 0:
         return begin, bad

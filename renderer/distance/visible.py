@@ -66,7 +66,7 @@ def _end(tree: Tree, mesh: Mesh, points: Floats, faces: NDArray[np.int64], threa
 
 def _are_open(tree: Tree, mesh: Mesh, start: _Ends, stop: _Ends, threads: int) -> NDArray[np.bool_]:
     """Whether nothing lies between the ends of segments."""
-    seen = ~any_hits(tree, _between(tree, mesh, start, stop, threads), mesh, threads)
+    seen = ~any_hits(tree, _between(tree, mesh, start, stop, threads), threads)
     # If the first face hit is one that contains the end, nothing lies before the end.
     doubtful = np.flatnonzero(~seen & (stop.places.faces >= 0))
     if len(doubtful):

@@ -26,6 +26,11 @@ def inlined(function: Callable[..., Any]) -> Any:
     return _decorated(function, forceinline=True)
 
 
+def entry_of(kernel: Any) -> Any:
+    """What Python calls of a kernel, to call it in a fifth of a microsecond less."""
+    return getattr(kernel, "entry", kernel)
+
+
 def is_on_disk(kernel: Any) -> bool:
     """Whether a kernel is on disk for some argument types, so that another process need not compile it.
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.jit.kinds import of_kind
 from renderer.materials.registry import reflected_light
+from renderer.numerics.kinds import of_kind
 from renderer.numerics.simd import load, minimum, pointer
 from renderer.numerics.vec3 import add, barycentric, dot, largest_component, normalized, row3, scale, sub
 from renderer.shade.faces import MERGED, PLACED, FaceWays

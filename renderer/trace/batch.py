@@ -100,9 +100,9 @@ def check_rays(
     Raises ``ValueError`` naming the argument and, for a bad bound, its row.
     """
     # Rays as most calls have them, for the sake of calls with few rays.
-    if _is_plain(origins) and _is_plain(directions) and origins.shape == directions.shape and not starts:
-        if type(t_min) is type(t_max) is float and t_min == 0.0 and t_max == np.inf:
-            return RayBatch(origins, directions, _ZERO, _INFINITY), origins.shape[:1]
+    usual = type(t_min) is type(t_max) is float and t_min == 0.0 and t_max == np.inf and not starts
+    if usual and _is_plain(origins) and _is_plain(directions) and origins.shape == directions.shape:
+        return RayBatch(origins, directions, _ZERO, _INFINITY), origins.shape[:1]
     origins, directions = _vectors("origins", origins), _vectors("directions", directions)
     # The usual bounds share arrays.
     low = None if type(t_min) is float and t_min == 0.0 else real_argument("t_min", t_min)

@@ -6,16 +6,20 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.jit.decorators import entry_of
 from renderer.mesh.mesh import Mesh
 from renderer.results.hits import Hits
 from renderer.system.threads import for_chunks
 from renderer.trace.batch import ALONE, CHUNK, NO_STARTS, RayBatch, reject
 from renderer.trace.layout import BLOCK_FACES, Tree
 from renderer.trace.ray_lanes import WIDTH
-from renderer.trace.rays import HIT_ROWS
+from renderer.trace.rays import HitArrays
 from renderer.trace.single import FEW_DEPTH, trace_few
-from renderer.trace.traverse import Progress, Scratch, new_scratch, search_chunk, trace_chunk
+from renderer.trace.traverse import Scratch, new_scratch, search_chunk, trace_chunk
 from renderer.trace.walk import stack_size
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 # Few rays go in smaller chunks, sixteen per thread, so that no thread has much more to do than another.
 _LEAST_CHUNK = 1024
@@ -23,48 +27,51 @@ _LEAST_CHUNK = 1024
 _BLOCK_TESTS = 1 << 22
 # Fewer rays than a packet holds go one by one, by a kernel that compiles in a fraction of the time.
 FEW = WIDTH - 1
-# The scratch for the faces that hold a start, where no ray starts on the surface.
-_NO_HOLDERS = np.empty(1, np.int64)
+# In place of arrays that a query does not write.
+_NO_T, _NO_FACE, _NO_HIT = np.empty(0), np.empty(0, np.int64), np.empty(0, np.bool_)
+_INT = np.dtype(np.int64)
 
 
 def closest_hits(tree: Tree, rays: RayBatch, mesh: Mesh, threads: int) -> Hits:
     """Closest hits of a batch."""
     count = rays.number
+    # Arrays of their own take less time to make than rows of one, which calls with few rays notice.
+    t, u, v = np.empty(count), np.empty(count), np.empty(count)
+    face, side, pile = np.empty(count, _INT), np.empty(count, _INT), np.empty(count, _INT)
     if count <= FEW and 0 < tree.depth <= FEW_DEPTH:
-        return _trace_few(tree, rays, count, mesh)
-    out = np.empty((HIT_ROWS, count))
-    _run(tree, rays, out, threads, any_hit=False)
-    t, u, v, face, side, pile = out
-    return Hits(t, face.view(np.int64), u, v, mesh, None, side.view(np.int64), pile.view(np.int64))
+        _trace_few(tree, rays, t, face, u, v, side, pile)
+    else:
+        _run(tree, rays, count, HitArrays(t, face, u, v, side, pile, _NO_HIT), threads, any_hit=False)
+    return Hits(t, face, u, v, mesh, None, side, pile)
 
 
-def any_hits(tree: Tree, rays: RayBatch, mesh: Mesh, threads: int) -> NDArray[np.bool_]:
+def any_hits(tree: Tree, rays: RayBatch, threads: int) -> NDArray[np.bool_]:
     """Whether each ray of a batch hits anything."""
     count = rays.number
     if count <= FEW and 0 < tree.depth <= FEW_DEPTH:
-        return _trace_few(tree, rays, count, mesh).face >= 0
-    # In whole words, so that kernels are compiled for one kind of output.
-    out = np.empty((1, -(-count // 8)))
-    _run(tree, rays, out, threads, any_hit=True)
-    return out.view(np.bool_)[0, :count]
+        unread, face, others = np.empty(count), np.empty(count, _INT), np.empty(count, _INT)
+        _trace_few(tree, rays, unread, face, unread, unread, others, others)
+        return face >= 0
+    hit = np.empty(count, np.bool_)
+    _run(tree, rays, count, HitArrays(_NO_T, _NO_FACE, _NO_T, _NO_T, _NO_FACE, _NO_FACE, hit), threads, any_hit=True)
+    return hit
 
 
-def _trace_few(tree: Tree, rays: RayBatch, count: int, mesh: Mesh) -> Hits:
-    """Closest hits of a few rays on the caller's thread, in arrays of their own: rows of one would take longer."""
-    t, u, v = np.empty(count), np.empty(count), np.empty(count)
-    face, side, pile = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count, np.int64)
+def _trace_few(
+    tree: Tree, rays: RayBatch, t: Floats, face: Integers, u: Floats, v: Floats, side: Integers, pile: Integers
+) -> None:
+    """Write the closest hits of a few rays, on the caller's thread."""
     origins, directions, t_min, t_max, starts = rays
     alone = starts is NO_STARTS
     scratch = None if alone else _take_scratch(tree.depth)
-    row = trace_few(
+    row = entry_of(trace_few)(
         tree.descriptor, origins, directions, t_min, t_max, ALONE if alone else starts, t, face, u, v, side, pile,
-        _NO_HOLDERS if scratch is None else scratch.holders,
+        _NO_HIT, _NO_FACE if scratch is None else scratch.holders,
     )  # fmt: skip
     if scratch is not None:
         _local.scratch = scratch
     if row >= 0:
         reject(rays, row, tree.scale)
-    return Hits(t, face, u, v, mesh, None, side, pile)
 
 
 def rays_against_blocks(tree: Tree) -> int:
@@ -72,34 +79,29 @@ def rays_against_blocks(tree: Tree) -> int:
     return max(1, _BLOCK_TESTS * BLOCK_FACES // max(1, len(tree.faces)))
 
 
-def _run(tree: Tree, rays: RayBatch, out: NDArray[np.float64], threads: int, any_hit: bool) -> None:
-    count = rays.number
+def _run(tree: Tree, rays: RayBatch, count: int, found: HitArrays, threads: int, any_hit: bool) -> None:
     size = min(CHUNK, max(_LEAST_CHUNK, count // (16 * threads)))
     if not tree.has_nodes:
         size = min(size, rays_against_blocks(tree))
-    bad, starts = list[int](), ALONE if rays.starts is NO_STARTS else rays.starts
-    given = (*rays[:-1], starts)
+    origins, directions, t_min, t_max, starts = rays
+    own = ALONE if starts is NO_STARTS else starts
+    arrays, bad = (tree.descriptor, origins, directions, t_min, t_max, own, *found, any_hit), list[int]()
 
     def trace(begin: int, end: int) -> Iterator[None]:
         # Only chunks after a bad ray are left out, so the first bad ray is always found.
         if bad and bad[0] < begin:
             return
-        if not tree.has_nodes:
-            scratch = _take_scratch(tree.depth)
-            row = search_chunk(tree.descriptor, *given, out, begin, end, any_hit, scratch.holders)
-            _local.scratch = scratch
-            if row >= 0:
-                bad.append(row)
-            return
-        scratch, progress = _take_scratch(tree.depth), Progress(begin, 0, 0)
-        while progress.begin < end or progress.following < progress.count:
-            *reached, row = trace_chunk(tree.descriptor, *given, out, progress, end, any_hit, scratch)
-            progress = Progress(*reached)
-            if row >= 0:
-                bad.append(row)
-                break
-            yield
+        scratch, row = _take_scratch(tree.depth), -1
+        if tree.has_nodes:
+            reached, following, waiting = begin, 0, 0
+            while row < 0 and (reached < end or following < waiting):
+                reached, following, waiting, row = trace_chunk(*arrays, scratch, reached, following, waiting, end)
+                yield
+        else:
+            row = search_chunk(*arrays, scratch.holders, begin, end)
         _local.scratch = scratch
+        if row >= 0:
+            bad.append(row)
 
     if count <= size:
         for _ in trace(0, count):

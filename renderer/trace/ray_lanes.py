@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined
-from renderer.jit.kinds import of_number
+from renderer.numerics.kinds import of_number
 from renderer.numerics.simd import broadcast_like, load, narrow, select, store
 from renderer.trace.best import NO_FACE, Best
 from renderer.trace.intersect import Shear, Slabs, box_limit, largest_of, make_shear, make_slabs, round_down

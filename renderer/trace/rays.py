@@ -3,10 +3,11 @@
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from renderer.arguments.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.jit.decorators import inlined, kernel
-from renderer.jit.kinds import of_number
+from renderer.numerics.kinds import of_number
 from renderer.numerics.simd import (
     address,
     bool_pointer,
@@ -54,6 +55,18 @@ class RayPointers(NamedTuple):
     starts: Any
 
 
+class HitArrays(NamedTuple):
+    """The arrays of ``HitPointers``; those that a query does not write are empty."""
+
+    t: NDArray[np.float64]
+    face: NDArray[np.int64]
+    u: NDArray[np.float64]
+    v: NDArray[np.float64]
+    side: NDArray[np.int64]
+    pile: NDArray[np.int64]
+    hit: NDArray[np.bool_]
+
+
 class HitPointers(NamedTuple):
     """Pointers to the results: t, face, u, v and side as in ``Hits``, the first of the coinciding faces that the ray
     reached; for any hits only ``hit``, a bool.
@@ -76,6 +89,19 @@ def ray_pointers(origins, directions, t_min, t_max, starts, scale):
         3 * np.int64(len(origins) > 1), 3 * np.int64(len(directions) > 1), np.int64(len(t_min) > 1),
         np.int64(len(t_max) > 1), scale, start_pointers(starts),
     )  # fmt: skip
+
+
+@inlined
+def batch_pointers(rays, scale):
+    """``RayPointers`` of a ``RayBatch``."""
+    origins, directions, t_min, t_max, starts = rays
+    return ray_pointers(origins, directions, t_min, t_max, starts, scale)
+
+
+@inlined
+def found_pointers(t, face, u, v, side, pile, hit):
+    """``HitPointers`` of the arrays of a ``HitArrays``."""
+    return HitPointers(pointer(t), pointer(face), pointer(u), pointer(v), pointer(side), pointer(pile), pointer(hit))
 
 
 @inlined

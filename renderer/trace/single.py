@@ -3,22 +3,12 @@
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.jit.kinds import of_number
-from renderer.numerics.simd import (
-    LOCAL_WORDS,
-    address,
-    bool_pointer,
-    is_negative,
-    load,
-    local_words,
-    offset,
-    pointer,
-    store,
-)
+from renderer.numerics.kinds import of_number
+from renderer.numerics.simd import LOCAL_WORDS, is_negative, load, local_words, offset, pointer, store
 from renderer.trace.best import NO_FACE, Best, no_hit
 from renderer.trace.intersect import largest_of, make_shear
 from renderer.trace.leaf import nearest_carefully
-from renderer.trace.rays import HitPointers, first_bad_ray, ray_at, ray_pointers, write_hit
+from renderer.trace.rays import first_bad_ray, found_pointers, ray_at, ray_pointers, write_hit
 from renderer.trace.single_ray import Found, enter_counted, prepare_single
 from renderer.trace.starts.record import PILE
 from renderer.trace.starts.search import is_near_start, search_from, t_from
@@ -103,17 +93,15 @@ def count_from_start(tree, rays, i, best):
 
 
 @kernel
-def trace_few(descriptor, origins, directions, t_min, t_max, starts, t, face, u, v, side, pile, holders):
-    """Closest hits of a few rays of a ``RayBatch``, one by one, as ``HitPointers`` have them.
+def trace_few(descriptor, origins, directions, t_min, t_max, starts, t, face, u, v, side, pile, hit, holders):
+    """Closest hits of a few rays of a ``RayBatch``, one by one, to the arrays of a ``HitArrays``.
 
     Returns the row of the first ray out of range, for which nothing is traced, or -1. The tree has at most FEW_DEPTH
     levels.
     """
     tree, count = tree_pointers(descriptor), len(t)
     source = ray_pointers(origins, directions, t_min, t_max, starts, tree.scale)
-    found = HitPointers(
-        pointer(t), pointer(face), pointer(u), pointer(v), pointer(side), pointer(pile), bool_pointer(address(t))
-    )
+    found = found_pointers(t, face, u, v, side, pile, hit)
     bad = first_bad_ray(source, 0, count)
     if bad >= 0:
         return bad

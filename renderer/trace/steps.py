@@ -14,7 +14,7 @@ from renderer.trace.best import Best, no_hit
 from renderer.trace.intersect import box_limit, face_in
 from renderer.trace.layout import BLOCK_FACES, Tree
 from renderer.trace.leaf import nearest_carefully
-from renderer.trace.rays import first_bad_ray, ray_at, ray_pointers
+from renderer.trace.rays import batch_pointers, first_bad_ray, ray_at
 from renderer.trace.single_ray import SingleRay, enter_node, prepare_single
 from renderer.trace.stack_entry import order_of
 from renderer.trace.trees import tree_pointers
@@ -57,7 +57,7 @@ def _count_chunk(descriptor, rays, counts, stack, near, begin, end):
     Returns the ray before which it ended, early after _WORK, and the row of a ray out of range, or -1.
     """
     tree = tree_pointers(descriptor)
-    source = ray_pointers(*rays, tree.scale)
+    source = batch_pointers(rays, tree.scale)
     bad, work = first_bad_ray(source, begin, end), np.int64(0)
     if bad < 0 and tree.has_nodes:
         waiting = _Waiting(pointer(stack), pointer(near), offset(pointer(near), len(stack)))

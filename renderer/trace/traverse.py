@@ -24,7 +24,7 @@ from renderer.trace.ray_lanes import (
     prepare_eight,
     start_of,
 )
-from renderer.trace.rays import HitPointers, RayPointers, first_bad_ray, hit_pointers, ray_at, ray_pointers
+from renderer.trace.rays import HitPointers, RayPointers, first_bad_ray, found_pointers, ray_at, ray_pointers
 from renderer.trace.single import search_carefully, write_best
 from renderer.trace.stack_entry import octant_of
 from renderer.trace.starts.cone import HOLDERS_WORDS
@@ -285,20 +285,23 @@ def trace_rays(tree, rays, found, count, scratch, any_hit):
 
 
 @kernel
-def trace_chunk(descriptor, origins, directions, t_min, t_max, starts, out, progress, end, any_hit, scratch):
-    """Hits of the rays of a ``RayBatch`` up to ``end`` into ``out``: the rows of ``hit_pointers``, or with ``any_hit``
-    bools.
+def trace_chunk(
+    descriptor, origins, directions, t_min, t_max, starts, t, face, u, v, side, pile, hit, any_hit, scratch,
+    begin, following, count, end,
+):  # fmt: skip
+    """Hits of the rays of a ``RayBatch`` up to ``end`` to the arrays of a ``HitArrays``.
 
-    ``descriptor`` is the tree's, which must have nodes. ``progress`` is (begin, 0, 0) in the first call for a chunk,
-    then that of the last call, with the same scratch. A call with much work ends early; all is done at (end, n, n).
+    ``descriptor`` is the tree's, which must have nodes. The ``Progress`` is (begin, 0, 0) in the first call for a
+    chunk, then that of the last call, with the same scratch. A call with much work ends early; all is done at (end, n,
+    n).
 
     Returns the three numbers of the ``Progress``, and the row of the first ray out of range, or -1; if there is one,
     nothing is traced. Plain numbers, as Numba would call Python to make a named tuple, and crash if Ctrl-C came then.
     """
     tree = tree_pointers(descriptor)
     source = ray_pointers(origins, directions, t_min, t_max, starts, tree.scale)
-    found = hit_pointers(out, out.shape[1])
-    bad = first_bad_ray(source, progress.begin, end)
+    found, progress = found_pointers(t, face, u, v, side, pile, hit), Progress(begin, following, count)
+    bad = first_bad_ray(source, begin, end)
     if bad < 0:
         query = _Query(source, found, scratch_pointers(scratch, source.starts), any_hit)
         progress = _trace_on(tree, query, progress, end)
@@ -306,11 +309,13 @@ def trace_chunk(descriptor, origins, directions, t_min, t_max, starts, out, prog
 
 
 @kernel
-def search_chunk(descriptor, origins, directions, t_min, t_max, starts, out, begin, end, any_hit, holders):
+def search_chunk(
+    descriptor, origins, directions, t_min, t_max, starts, t, face, u, v, side, pile, hit, any_hit, holders, begin, end
+):  # fmt: skip
     """Hits of the rays begin:end, as ``trace_chunk`` writes them, for a tree without nodes; returns the row or -1."""
     tree = tree_pointers(descriptor)
     source = ray_pointers(origins, directions, t_min, t_max, starts, tree.scale)
-    found = hit_pointers(out, out.shape[1])
+    found = found_pointers(t, face, u, v, side, pile, hit)
     bad = first_bad_ray(source, begin, end)
     if bad < 0:
         search_blocks(tree, source, found, begin, end, pointer(holders), any_hit)

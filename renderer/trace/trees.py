@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 from renderer.jit.decorators import inlined
-from renderer.jit.kinds import of_kind
+from renderer.numerics.kinds import of_kind
 from renderer.numerics.simd import double_of, float32_pointer, float64_pointer, int32_pointer, load, pointer
 from renderer.trace.best import admits_all, may_hit_all
 from renderer.trace.edge_signs import coordinate_of_block

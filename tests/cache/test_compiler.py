@@ -161,13 +161,13 @@ from numba import njit
 from renderer import Octree
 from renderer.trace.trees import tree_pointers
 from renderer.trace.batch import check_rays
-from renderer.trace.rays import HIT_ROWS, hit_pointers, ray_pointers
+from renderer.trace.rays import HIT_ROWS, hit_pointers, batch_pointers
 from renderer.trace.traverse import new_scratch, scratch_pointers, trace
 
 @njit(error_model="numpy")
 def mine(descriptor, rays, out, memory):
     tree = tree_pointers(descriptor)
-    source, found = ray_pointers(*rays, tree.scale), hit_pointers(out, len(rays[1]))
+    source, found = batch_pointers(rays, tree.scale), hit_pointers(out, len(rays[1]))
     trace(tree, source, found, 0, len(rays[1]), scratch_pointers(memory, source.starts), False)
 
 octree, rays = Octree.load(sys.argv[1]), np.random.default_rng(0).normal(size=(50, 3)) * 3

@@ -24,7 +24,7 @@ from renderer.jit.decorators import kernel
 from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
 from renderer.trace.batch import NO_STARTS, RayBatch
-from renderer.trace.rays import HIT_ROWS, hit_pointers, ray_pointers
+from renderer.trace.rays import HIT_ROWS, batch_pointers, hit_pointers
 from renderer.trace.traverse import new_scratch, scratch_pointers, search_blocks, trace
 from renderer.trace.trees import tree_pointers
 
@@ -40,7 +40,7 @@ def unchecked(descriptor, rays, out, any_hit, memory, by_blocks):
     """``trace_chunk`` without its check of the rays."""
     tree = tree_pointers(descriptor)
     count = len(rays[1])
-    source, found = ray_pointers(*rays, tree.scale), hit_pointers(out, count)
+    source, found = batch_pointers(rays, tree.scale), hit_pointers(out, count)
     if by_blocks:
         search_blocks(tree, source, found, 0, count, scratch_pointers(memory, source.starts).holders, any_hit)
     else:

@@ -15,7 +15,7 @@ from renderer.trace.intersect import Ray, box_limit, enter_boxes, make_slabs, ro
 from renderer.trace.layout import NODE_WORDS
 from renderer.trace.packet import are_coherent, enter_beam, make_beam
 from renderer.trace.ray_lanes import GROUP_STRIDE, WIDTH, Prepared, prepare_eight, prepare_ray
-from renderer.trace.rays import ray_at, ray_pointers
+from renderer.trace.rays import batch_pointers, ray_at
 
 SEEDS = st.integers(0, 2**20)
 
@@ -88,7 +88,7 @@ def test_a_packet_that_gives_up_is_traced_all_the_same():
 @kernel
 def _prepare_both(rays, numbers, together, alone):
     floats, doubles, integers = together
-    source = ray_pointers(*rays, 0.25)
+    source = batch_pointers(rays, 0.25)
     prepare_eight(source, Prepared(pointer(floats), pointer(doubles), pointer(integers)), 8, pointer(numbers))
     floats, doubles, integers = alone
     for k in range(8):
@@ -113,7 +113,7 @@ def test_eight_rays_are_prepared_as_each_is_alone(seed):
 
 @kernel
 def _are_coherent(rays):
-    return are_coherent(ray_pointers(*rays, 1.0), 0)
+    return are_coherent(batch_pointers(rays, 1.0), 0)
 
 
 def _coherent(origins, directions):

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined
-from renderer.jit.kinds import of_kind, of_number
+from renderer.numerics.kinds import of_kind, of_number
 from renderer.numerics.simd import address, float64_pointer, int32_pointer, load, offset, pointer
 from renderer.numerics.vec3 import row3, scale, three
 from renderer.trace.layout import MASK_BITS
