@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from renderer.arguments.arrays import flag_argument
 from renderer.arguments.counts import count_argument
-from renderer.arguments.types import SPLIT, ArrayLike, Split
+from renderer.arguments.split import SPLIT, Split
+from renderer.arguments.types import ArrayLike
 from renderer.errors import MeshError, expect
 from renderer.mesh.foreign import TriangleMesh, has_triangles
 from renderer.mesh.load import load_mesh
@@ -192,7 +193,7 @@ class Octree(_Accelerator):
     >>> octree.closest_hit([[0.25, 0.25, 2.0]], [[0, 0, -1]]).t
     array([2.])
     >>> Octree("scenes/models/torus_knot.ply")
-    <Octree over 40,000 faces, depth 7>
+    <Octree over 40,000 faces, depth 6>
     """
 
     @overload

@@ -69,8 +69,10 @@ def _trace(count: int) -> None:
 
 
 def _leave() -> None:
-    octree = Octree.from_mesh(_TRIANGLE)
-    octree.any_hit([0.1, 0.1, 0.0], [0.0, 0.0, 1.0], leaving=0)
+    octree, starts = Octree.from_mesh(_TRIANGLE), np.tile([0.1, 0.1, 0.0], (20, 1))
+    for accelerator in (octree, BruteForce.from_mesh(_TRIANGLE)):
+        accelerator.any_hit(starts[:1], [0.0, 0.0, 1.0], leaving=0)
+        accelerator.any_hit(starts, [0.0, 0.0, 1.0], leaving=0)
     octree.visible([0.1, 0.1, 0.0], [0.1, 0.1, 1.0], leaving=0)
 
 

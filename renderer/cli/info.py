@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any, get_args
 
-from renderer.arguments.types import SPLIT, Split
+from renderer.arguments.split import SPLIT, Split
 from renderer.cli.scene import SPLIT_RULE, add_scene
 from renderer.errors import expect
 from renderer.system.terminal import say

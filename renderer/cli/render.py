@@ -9,7 +9,7 @@ import warnings
 from pathlib import Path
 from typing import Any, get_args
 
-from renderer.arguments.types import SPLIT, Split
+from renderer.arguments.split import SPLIT, Split
 from renderer.cli.cluster import add_cluster, render_on_cluster
 from renderer.cli.scene import SPLIT_RULE, add_scene, say_up, write_scene_of
 from renderer.cli.turntable import add_frames, render_turntable

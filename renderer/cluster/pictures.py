@@ -10,7 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from renderer.arguments.types import SPLIT, Split
+from renderer.arguments.split import SPLIT, Split
 from renderer.checkpoints.parts import remove_parts
 from renderer.checkpoints.pictures import Picture, PictureRun, checked_band, digest_of_scene
 from renderer.cluster.tasks import Results, Task, results

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.arguments.types import SPLIT
+from renderer.arguments.split import SPLIT
 from renderer.checkpoints.parts import digest_of
 from renderer.cluster.workers import SentMesh
 from renderer.errors import expect

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from renderer.arguments.counts import count_argument
-from renderer.arguments.types import SPLIT, Split
+from renderer.arguments.split import SPLIT, Split
 from renderer.checkpoints.parts import Parts, digest_of
 from renderer.checkpoints.study import PART, Study, parts_of
 from renderer.cluster.tasks import Results, Task, results

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.arguments.types import Split
+from renderer.arguments.split import Split
 from renderer.checkpoints.pictures import Picture
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree

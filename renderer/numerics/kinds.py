@@ -12,7 +12,7 @@ def of_kind(typingctx, array, of_int64, of_others):
 
 
 @intrinsic
-def of_number(typingctx, value, of_numbers, of_others):
-    """The first of two kernels for a number, else the second."""
-    chosen = of_numbers if isinstance(value, types.Number) else of_others
-    return chosen(value, of_numbers, of_others), lambda context, builder, sig, args: context.get_dummy_value()
+def of_none(typingctx, value, for_none, of_others):
+    """The first of two kernels for None, else the second."""
+    chosen = for_none if isinstance(value, types.NoneType) else of_others
+    return chosen(value, for_none, of_others), lambda context, builder, sig, args: context.get_dummy_value()

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.arguments.types import Split
+from renderer.arguments.split import Split
 from renderer.materials.appearance import Appearance
 from renderer.materials.base import appearance_of
 from renderer.mesh.mesh import Mesh

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.arguments.types import SPLIT, Split
+from renderer.arguments.split import SPLIT, Split
 from renderer.errors import expect
 from renderer.jit.notice import Stopwatch
 from renderer.lazy import lazy

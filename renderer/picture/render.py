@@ -6,7 +6,7 @@ from numbers import Real
 from typing import Any, Literal, NamedTuple, Unpack
 
 from renderer.arguments.arrays import real_argument
-from renderer.arguments.types import SPLIT, Split
+from renderer.arguments.split import SPLIT, Split
 from renderer.errors import expect
 from renderer.picture.camera_rays import tile_side
 from renderer.picture.image import PLANES, CutWarning, Image

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined
-from renderer.numerics.kinds import of_number
+from renderer.numerics.kinds import of_none
 from renderer.numerics.simd import broadcast_like, load, narrow, select, store
 from renderer.trace.best import NO_FACE, Best
 from renderer.trace.intersect import Shear, Slabs, box_limit, largest_of, make_shear, make_slabs, round_down
@@ -49,8 +49,7 @@ CHILD, TOP, NUMBER, UNRESOLVED = 7 * WIDTH, 8 * WIDTH, 9 * WIDTH, 10 * WIDTH
 
 
 class Prepared(NamedTuple):
-    """Pointers to groups of rays: float32, float64 and int64; and NO_SURFACE or else, as ``RayPointers``
-    has it."""
+    """Pointers to groups of rays: float32, float64 and int64. ``starts`` is None where no ray starts on the surface."""
 
     floats: Any
     doubles: Any
@@ -89,7 +88,7 @@ def prepare_ray(rays, r, ray, t_max):
     store(doubles, DIRECTION_Z + r, shear.direction_z)
     store(doubles, T_MIN + r, ray.t_min)
     store(doubles, LARGEST + r, largest)
-    of_number(rays.starts, _put_no_start, _put_start)(doubles, r, ray)
+    of_none(rays.starts, _put_no_start, _put_start)(doubles, r, ray)
     _put_axes(integers, BLOCK_ROW + r, shear.row_x, shear.row_y, shear.row_z)
     store(doubles, T + r, t_max)
     store(integers, FACE + r, broadcast_like(np.int64(NO_FACE), t_max))
@@ -109,7 +108,7 @@ def _put_start(doubles, r, ray):
 @inlined
 def start_of(rays, r):
     """The ray's slack, and the face that it starts on."""
-    return of_number(rays.starts, _no_start, _start_in_lane)(rays.doubles, r)
+    return of_none(rays.starts, _no_start, _start_in_lane)(rays.doubles, r)
 
 
 @inlined

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from renderer.arguments.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.kinds import of_number
+from renderer.numerics.kinds import of_none
 from renderer.numerics.simd import (
     address,
     bool_pointer,
@@ -40,7 +40,7 @@ class RayPointers(NamedTuple):
     """Pointers to rows of origins and directions, and to t_min and t_max.
 
     Each has a step from one ray to the next, 0 where all share one. ``scale`` is the tree's, a power of two, so t is
-    converted exactly. ``starts`` are those of the rays that start on the surface, or ``NO_SURFACE``.
+    converted exactly. ``starts`` are those of the rays that start on the surface, or None.
     """
 
     origins: Any
@@ -180,7 +180,7 @@ def eight_rays_at(rays, numbers):
     direction = gather8(d, numbers, z, 0), gather8(d, numbers, z, 1), gather8(d, numbers, z, 2)
     # rule: ends-of-eight
     t_min, t_max = _often_one(rays.t_min, numbers, rays.min_step, 0), _often_one(rays.t_max, numbers, rays.max_step, 0)
-    slack, leaving = of_number(rays.starts, _no_starts8, starts8)(rays.starts, numbers)
+    slack, leaving = of_none(rays.starts, _no_starts8, starts8)(rays.starts, numbers)
     slack, leaving = broadcast_like(slack, t_min), broadcast_like(leaving, t_min)
     return _scaled(origin, direction, t_min, t_max, rays.scale, slack, leaving, ALL, -1.0)
 

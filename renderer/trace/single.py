@@ -3,7 +3,7 @@
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.kinds import of_number
+from renderer.numerics.kinds import of_none
 from renderer.numerics.simd import LOCAL_WORDS, is_negative, load, local_words, offset, pointer, store
 from renderer.trace.best import NO_FACE, Best, no_hit
 from renderer.trace.intersect import largest_of, make_shear
@@ -44,7 +44,7 @@ def search_carefully(tree, rays, i, stack, holders, any_hit):
     hit.
     """
     ray, t_max = ray_at(rays, i)
-    return of_number(rays.starts, _search_alone, _search)(tree, rays.starts, i, ray, t_max, stack, holders, any_hit)
+    return of_none(rays.starts, _search_alone, _search)(tree, rays.starts, i, ray, t_max, stack, holders, any_hit)
 
 
 @inlined
@@ -66,7 +66,7 @@ def write_best(tree, rays, found, i, best, slack, largest, dz, any_hit):
     ``slack`` is the ray's, ``largest`` the largest component of its direction: for a near hit, the move of the origin
     is a part of t.
     """
-    of_number(rays.starts, _write_alone, _write)(tree, rays, found, i, best, slack, largest, dz, any_hit)
+    of_none(rays.starts, _write_alone, _write)(tree, rays, found, i, best, slack, largest, dz, any_hit)
 
 
 @inlined

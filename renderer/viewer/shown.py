@@ -7,7 +7,7 @@ from pathlib import Path
 from secrets import token_hex
 from typing import Literal, NamedTuple
 
-from renderer.arguments.types import SPLIT
+from renderer.arguments.split import SPLIT
 from renderer.errors import expect
 from renderer.lazy import lazy
 from renderer.materials.columns import REFLECTANCE, TRANSMITTANCE

@@ -76,7 +76,7 @@ def test_info(capsys: pytest.CaptureFixture[str]) -> None:
     lights = len(load_scene(STAIRS).lights)
     assert f"2 meshes, {lights} lights, orthographic camera" in lines[0]
     assert re.match(r"  stairs +44 faces +flat +stone \(phong\)", lines[1]) and re.match(r"  floor +2 faces", lines[2])
-    assert lines[3].startswith("octree (midpoint): ") and "46 references" in lines[3]
+    assert lines[3].startswith("octree (sah): ") and "46 references" in lines[3]
 
 
 @cases("arguments", [["--help"], ["--version"], ["render", "--help"], ["info", "--help"], ["compile", "--help"]])

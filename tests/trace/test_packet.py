@@ -89,11 +89,13 @@ def test_a_packet_that_gives_up_is_traced_all_the_same():
 def _prepare_both(rays, numbers, together, alone):
     floats, doubles, integers = together
     source = batch_pointers(rays, 0.25)
-    prepare_eight(source, Prepared(pointer(floats), pointer(doubles), pointer(integers)), 8, pointer(numbers))
+    prepare_eight(
+        source, Prepared(pointer(floats), pointer(doubles), pointer(integers), source.starts), 8, pointer(numbers)
+    )
     floats, doubles, integers = alone
     for k in range(8):
         ray, t_max = ray_at(source, numbers[k])
-        prepare_ray(Prepared(pointer(floats), pointer(doubles), pointer(integers)), 8 + k, ray, t_max)
+        prepare_ray(Prepared(pointer(floats), pointer(doubles), pointer(integers), source.starts), 8 + k, ray, t_max)
 
 
 @cases("seed", range(10))
@@ -134,7 +136,7 @@ def test_what_is_coherent():
 @kernel
 def _meet_beam_and_rays(nodes, origins, directions, t_max, room):
     floats, doubles, integers = room
-    rays, alone, limit = Prepared(pointer(floats), pointer(doubles), pointer(integers)), 0, np.float32(0.0)
+    rays, alone, limit = Prepared(pointer(floats), pointer(doubles), pointer(integers), None), 0, np.float32(0.0)
     for r in range(WIDTH):
         o, d = origins[r], directions[r]
         ray = Ray(o[0], o[1], o[2], d[0], d[1], d[2], 0.0, 0.0, -1.0)

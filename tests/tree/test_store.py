@@ -360,7 +360,7 @@ HEADERS: dict[str, tuple[Change, str]] = {
     "no depth": (lambda told: told.pop("depth"), "header: expected the keys"),
     "a key more": (lambda told: told.update(more=1), "header: expected the keys"),
     "depth -1": (lambda told: told.update(depth=-1), "depth: expected an integer from 0 to 256, got -1"),
-    "depth less": (lambda told: told.update(depth=1), "depth: expected the levels of nodes, 2, got 1"),
+    "depth less": (lambda told: told.update(depth=1), "depth: expected the levels of nodes, 2 or more, got 1"),
     "depth none": (lambda told: told.update(depth=0), "depth: expected the levels of nodes, 1 or more, got 0"),
     "depth of many digits": (lambda told: told.update(depth=10**4000), "depth: expected an integer from 0 to 256"),
     "scale 0": (lambda told: told.update(scale=0.0), "scale: expected a power of two, got 0.0"),

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined
-from renderer.numerics.kinds import of_kind, of_number
+from renderer.numerics.kinds import of_kind, of_none
 from renderer.numerics.simd import address, float64_pointer, int32_pointer, load, offset, pointer
 from renderer.numerics.vec3 import row3, scale, three
 from renderer.trace.layout import MASK_BITS
@@ -49,20 +49,21 @@ class Start(NamedTuple):
     code: int
 
 
-# In place of ``StartPointers``: no ray starts on the surface, and each may hit every instance. And in place of those of
-# rays that may.
-NO_SURFACE, ON_SURFACE = 0, None
+# For the type of ``ray_lanes.Prepared.starts``: rays may start on the surface.
+ON_SURFACE = 0
 
 
 @inlined
 def start_pointers(starts):
-    """``StartPointers`` of an array of starts, HEAD int64 and rows of ROW float64; NO_SURFACE of one of uint64."""
+    """``StartPointers`` of an array of starts, HEAD int64 and rows of ROW float64; None of one of uint64, for rays that
+    do not start on the surface and may hit every instance.
+    """
     return of_kind(starts, _pointers, _none)(starts)
 
 
 @inlined
 def _none(starts):
-    return NO_SURFACE
+    return None
 
 
 @inlined
@@ -79,7 +80,7 @@ def _pointers(starts):
 @inlined
 def start_row(starts, i):
     """Slack, face, mask and ignored instance of ray ``i``."""
-    return of_number(starts, _usual_row, _own_row)(starts, i)
+    return of_none(starts, _usual_row, _own_row)(starts, i)
 
 
 @inlined

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from renderer.arguments.types import SPLIT
+from renderer.arguments.split import SPLIT
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from validation.benchmark.peers import ours

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.arguments.types import SPLIT
+from renderer.arguments.split import SPLIT
 from renderer.checkpoints import study as runs
 from renderer.checkpoints.parts import Parts, digest_of
 from renderer.cluster import connected, run_on

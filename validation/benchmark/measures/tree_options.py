@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
-from renderer.arguments.types import SPLIT, Split
+from renderer.arguments.split import SPLIT, Split
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.results.hits import Hits

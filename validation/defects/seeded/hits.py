@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from validation.defects.changes import Change, Constant, Function, Rule, Wrapped, after
+from validation.defects.changes import Change, Constant, Function, Rule, Wrapped
 from validation.defects.edits import argument, call, choice, compare, drop, element, value, without
 from validation.defects.seeded.defect import Defect
 
@@ -51,8 +51,9 @@ def _closest_but_last_of_chunks(sound: Any, tree: Any, rays: Any, *rest: Any) ->
     return sound(tree, rays._replace(t_max=ends), *rest)
 
 
-def _few_an_ulp_farther(out: Any) -> None:
-    out[0] *= 1.0 + 2.0**-52
+def _few_an_ulp_farther(sound: Any, tree: Any, rays: Any, t: Any, *others: Any) -> None:
+    sound(tree, rays, t, *others)
+    t *= 1.0 + 2.0**-52
 
 
 def _points_moved(sound: Any, mesh: Any, face: Any, u: Any, v: Any) -> Any:
@@ -109,7 +110,7 @@ _CHANGES: dict[str, Change] = {
     "any hit forgets what is near": Wrapped("any_hits", _any_beyond_one),
     "a packet of any hits drops what waits beyond eight octants": Rule("packet-stack", value("min(_, 8)")),
     "single rays skip a leaf's last block": Rule("blocks-of-leaf", argument(2, "max(_ - 1, 1)")),
-    "single rays are an ulp too far": after("closest._trace_few", _few_an_ulp_farther),
+    "single rays are an ulp too far": Wrapped("closest._trace_few", _few_an_ulp_farther),
     "bad rays are let through": Wrapped("closest.reject", lambda sound, *arguments: None),
     "places of hits off by 1e-9 of a corner": Wrapped("hits.points_on", _points_moved),
     "normals of hits turned inwards on half the faces": Wrapped("hits._normals", _normals_turned),
