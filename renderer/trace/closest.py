@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from renderer.jit.decorators import entry_of
 from renderer.mesh.mesh import Mesh
 from renderer.results.hits import Hits
-from renderer.system.spare import empty_arrays
 from renderer.system.threads import for_chunks
 from renderer.trace.batch import ALONE, CHUNK, NO_STARTS, RayBatch, reject
 from renderer.trace.layout import BLOCK_FACES, Tree
@@ -30,20 +29,19 @@ _BLOCK_TESTS = 1 << 22
 FEW = WIDTH - 1
 # In place of arrays that a query does not write.
 _NO_T, _NO_FACE, _NO_HIT = np.empty(0), np.empty(0, np.int64), np.empty(0, np.bool_)
-_FLOAT, _INT = np.dtype(np.float64), np.dtype(np.int64)
+_INT = np.dtype(np.int64)
 
 
 def closest_hits(tree: Tree, rays: RayBatch, mesh: Mesh, threads: int) -> Hits:
     """Closest hits of a batch."""
     count = rays.number
+    # Arrays of their own take less time to make than rows of one, which few rays notice.
+    t, u, v = np.empty(count), np.empty(count), np.empty(count)
+    face, side, pile = np.empty(count, _INT), np.empty(count, _INT), np.empty(count, _INT)
     if count <= FEW and 0 < tree.depth <= FEW_DEPTH:
-        # Arrays of their own take less time to make than rows of one, which few rays notice.
-        t, u, v = np.empty(count), np.empty(count), np.empty(count)
-        face, side, pile = np.empty(count, _INT), np.empty(count, _INT), np.empty(count, _INT)
         _trace_few(tree, rays, t, face, u, v, side, pile)
-        return Hits(t, face, u, v, mesh, None, side, pile)
-    t, u, v, face, side, pile = empty_arrays(count, (_FLOAT, _FLOAT, _FLOAT, _INT, _INT, _INT))
-    _run(tree, rays, count, HitArrays(t, face, u, v, side, pile, _NO_HIT), threads, any_hit=False)
+    else:
+        _run(tree, rays, count, HitArrays(t, face, u, v, side, pile, _NO_HIT), threads, any_hit=False)
     return Hits(t, face, u, v, mesh, None, side, pile)
 
 

@@ -34,7 +34,7 @@ class RayFamily:
 
 def float32_exact(values: ArrayLike) -> Floats:
     """``values`` rounded to float32 and stored as float64."""
-    return np.asarray(values).astype(np.float32).astype(np.float64)
+    return np.asarray(values).astype(np.float32, order="C").astype(np.float64)
 
 
 def families(vertices: Floats, faces: Ints, count: int, seed: int) -> tuple[RayFamily, ...]:
