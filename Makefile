@@ -24,7 +24,7 @@ help:
 	@echo "make machines   run the tests on a busy, a small, a large and a foreign machine, half an hour"
 	@echo "make lint       check style, types, import order and the absence of other languages"
 	@echo "make bench      measure speed beside other systems; writes reports/benchmark.html"
-	@echo "                QUICK=1 for the short run, ARGS='--mesh FILE' or '--huge' for more"
+	@echo "                QUICK=1 for the short run, ARGS='--mesh FILE', '--huge' or '--avx2' for more"
 	@echo "make conformance TRIMESH=DIR   run trimesh's own tests, from a checkout of its repository, with the drop-in"
 	@echo "make docs       build the site, gallery included, and check its links; writes build/site/index.html"
 	@echo "make clean      remove everything that make made, .venv included"

@@ -32,7 +32,7 @@ def distilled(path: Path) -> tuple[str, Record]:
     if run["quick"]:
         raise ValueError(f"{path}: expected a whole run, got a quick one")
     if "queries" in run and "builds" in run:
-        return f"bench {_vectors()}", _rounded(_origin(run, run["date"], "make bench") | bench(run))
+        return f"bench {_vectors(run)}", _rounded(_origin(run, run["date"], "make bench") | bench(run))
     if not (run["own"] and run["verdict"]["passed"] and not run["left_out"]):
         raise ValueError(f"{path}: expected a run of all sections that passed")
     return "validate", _rounded(_origin(run, run["started"], "make validate") | validate(run))
@@ -86,14 +86,17 @@ def _origin(run: Record, started: str, command: str) -> Record:
     """Where the figures come from; the commit where the sources are still those that ran."""
     around = run["environment"]
     known = run.get("commit") or (commit() if around["sources"] == sources_sha256() else None)
+    limit = ", limited to it" if around.get("limited") else ""
     return {
-        "command": command, "machine": f"{around['processor']}, {around['processors']} cores, {_vectors()}",
+        "command": command, "machine": f"{around['processor']}, {around['processors']} cores, {_vectors(run)}{limit}",
         "commit": (known or f"sources {around['sources']}")[:15 if not known else 7], "date": started[:10],
         "seconds": run["seconds"], "load": around.get("load"),
     }  # fmt: skip
 
 
-def _vectors() -> str:
+def _vectors(run: Record) -> str:
+    if run["environment"].get("limited") == "x86-64-v3":
+        return "AVX2"
     return "AVX-512" if not lacking("x86-64-v4") else "AVX2" if not lacking("x86-64-v3") else "no AVX2"
 
 

@@ -15,7 +15,7 @@ from renderer.picture.pack import media_around
 from renderer.picture.prepare import MediaRule, PreparedScene, arrays_for, media_limit
 from renderer.results.hits import Hits
 from renderer.shade.crossing import SPARE, Change, Together, change_of, place_at, surface_together_of, together_of
-from renderer.shade.direct import MOST_PANES
+from renderer.shade.direct import MOST_HOLES
 from renderer.shade.lights import aim_from
 from renderer.shade.looks import OWN_COLUMNS
 from renderer.shade.shading import reflect
@@ -114,7 +114,7 @@ class Steps:
     def meet(self, ray: Ray) -> SurfaceHit | None:
         """The nearest surface that the ray hits."""
         origin, start, t = ray.origin, ray.start, 0.0
-        for _ in range(MOST_PANES + 1):
+        for _ in range(MOST_HOLES + 1):
             hits = self.closest(origin, ray.direction, np.inf, start)
             if not hits.hit[0]:
                 return None

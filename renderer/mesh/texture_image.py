@@ -156,3 +156,8 @@ class TextureImage:
             row, column = np.argwhere(~np.isfinite(kept))[0][:2].tolist()
             raise self._error(f"expected finite values, got {kept[row, column].tolist()} in row {row}, column {column}")
         return read_only(kept.reshape(*kept.shape[:2], -1))
+
+
+def value_of_one(pixels: NDArray[Any]) -> float:
+    """The value of pixels that stands for 1: the largest of integers, 1 of floats."""
+    return 1.0 if pixels.dtype.kind == "f" else float(np.iinfo(pixels.dtype).max)

@@ -627,3 +627,24 @@ def farthest_first(typingctx, mask, distances, links, index):
         return builder.bitcast(builder.shuffle_vector(link, key, pairs), _llvm(I64X8))
 
     return I64X8(mask, distances, links, types.intp), codegen
+
+
+# For each mask of eight lanes, those that are set and then the others.
+_SET_FIRST = [sorted(range(8), key=lambda lane: mask >> lane & 1 == 0) for mask in range(256)]
+
+
+@intrinsic
+def set_first(typingctx, mask, links, index):
+    """Eight int64 whose low words are int32, from ``index`` on of the ``pointer`` ``links``; those in the mask first."""
+
+    def codegen(context, builder, sig, args):
+        byte, word, wide = (ir.IntType(bits) for bits in (8, 32, 64))
+        row = ir.VectorType(byte, 8)
+        table = ir.Constant(ir.ArrayType(row, 256), [ir.Constant(row, order) for order in _SET_FIRST])
+        at = builder.zext(builder.bitcast(args[0], byte), wide)
+        order = builder.load(builder.gep(cgutils.global_constant(builder, "set_first", table), [wide(0), at]))
+        eight = ir.VectorType(word, 8)
+        link = _load(builder, _pointer(context, builder, sig.args[1], args[1], args[2], eight), sig.args[1])
+        return builder.zext(_permuted(builder, link, builder.zext(order, eight)), _llvm(I64X8))
+
+    return I64X8(mask, links, types.intp), codegen

@@ -10,7 +10,7 @@ from renderer.errors import expect
 from renderer.materials.appearance import Appearance
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.texture import Texture
-from renderer.mesh.texture_image import TextureImage
+from renderer.mesh.texture_image import TextureImage, value_of_one
 from renderer.scene.instance import Instance
 from renderer.shade.records import (
     CLAMP,
@@ -110,7 +110,7 @@ def _linear(pixels: NDArray[Any], is_srgb: bool) -> NDArray[np.float32]:
     found = np.ones((*pixels.shape[:2], 4), np.float32)
     channels = pixels.shape[2]
     alpha = channels in (2, 4)
-    most = 1.0 if pixels.dtype.kind == "f" else float(np.iinfo(pixels.dtype).max)
+    most = value_of_one(pixels)
     colors = pixels[..., : channels - alpha]
     # rule: linear-of-srgb
     if is_srgb:

@@ -19,7 +19,7 @@ from renderer.mesh.load import load_mesh, mesh_suffix
 from renderer.mesh.material import MeshMaterial
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.texture import Texture
-from renderer.mesh.texture_image import TextureImage
+from renderer.mesh.texture_image import TextureImage, value_of_one
 
 Space = Literal["linear", "srgb"]
 
@@ -111,15 +111,14 @@ def parts_of_file(mesh: Mesh, space: Space, smooth: bool, crease: float) -> list
     """
     colors = space if mesh.colors is not None else None
     rows = np.full(len(mesh.faces), -1) if mesh.face_materials is None else mesh.face_materials
-    present = np.unique(rows).tolist() or [-1]
+    present, counts = np.unique(rows, return_counts=True)
     whole = mesh.creased(crease) if smooth and mesh.normals is None and len(present) > 1 else mesh
-    ends = np.cumsum(np.unique(rows, return_counts=True)[1])[:-1]
-    chosen = np.split(np.argsort(rows, kind="stable"), ends)
+    chosen = np.split(np.argsort(rows, kind="stable"), np.cumsum(counts)[:-1])
     parts = []
-    for row, faces in zip(present, chosen, strict=True):
+    for row, faces in zip(present.tolist() or [-1], chosen, strict=True):
         own = mesh.materials[row] if row >= 0 else None
         name = f"{mesh.name or 'mesh'}: {own.name or row}" if own else f"{mesh.name or 'mesh'}: plain"
-        part = whole if len(present) == 1 else _of_faces(whole, faces)
+        part = whole if len(present) <= 1 else _of_faces(whole, faces)
         look = material_of(own, colors) if own else Phong(diffuse=1.0 if colors else 0.8, vertex_colors=colors)
         parts.append(Part(part, name, look if mesh.texcoords is not None else _without_maps(look)))
     return parts
@@ -197,9 +196,8 @@ def _mean(texture: Texture | None, channel: int) -> float:
     if texture is None:
         return 1.0
     pixels = texture.image.pixels
-    most = 1.0 if pixels.dtype.kind == "f" else float(np.iinfo(pixels.dtype).max)
     values = pixels[..., channel if pixels.shape[2] >= 3 else 0]
-    return min(max(float(values.mean(dtype=np.float64)) / most, 0.0), 1.0)
+    return min(max(float(values.mean(dtype=np.float64)) / value_of_one(pixels), 0.0), 1.0)
 
 
 def _opacity(own: MeshMaterial) -> dict[str, Any]:
@@ -217,7 +215,7 @@ def _alpha_map(own: MeshMaterial) -> Texture | None:
     if own.alpha_texture is not None:
         pixels = own.alpha_texture.image.pixels
         if pixels.shape[2] == 3:  # its grey
-            grey = pixels.mean(axis=2) / (1.0 if pixels.dtype.kind == "f" else np.iinfo(pixels.dtype).max)
+            grey = pixels.mean(axis=2) / value_of_one(pixels)
             return replace(own.alpha_texture, image=TextureImage(grey.astype(np.float32)))
         return own.alpha_texture
     texture = own.base_color_texture

@@ -32,7 +32,7 @@ _ORIGIN, _DIRECTION, _T_MAX = 0, 3 * SIZE, 6 * SIZE
 # The most faces that light passes on its way to a surface.
 MOST_PANES = 256
 # The most holes that a ray goes through to a surface: rounding could keep it in one place for ever.
-_MOST_HOLES = 1 << 16
+MOST_HOLES = 1 << 16
 _TOWARDS, _ARRIVING, _START, SHADOW_DOUBLES = 7 * SIZE, 10 * SIZE, 13 * SIZE, (13 + ROW) * SIZE
 
 
@@ -186,7 +186,7 @@ def behind_holes(tree, scene, scratch, d, spot, rule):
     shadows, found, t, panes = scratch.shadows, scratch.passed, 0.0, 0
     put3(shadows, _DIRECTION, d)
     store(shadows, _T_MAX, np.inf)
-    while spot.face >= 0 and panes < _MOST_HOLES and not scene.looks.is_there(scene, spot):
+    while spot.face >= 0 and panes < MOST_HOLES and not scene.looks.is_there(scene, spot):
         _go_on(scene, shadows, 0, spot, rule)
         trace_rays(tree, _shadow_rays(scene, shadows, scratch.zero, 0), found, 1, scratch.trace, np.bool_(False))
         t, spot = t + load(found.t, 0), Spot(load(found.face, 0), load(found.u, 0), load(found.v, 0))

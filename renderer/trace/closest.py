@@ -14,7 +14,7 @@ from renderer.trace.batch import ALONE, CHUNK, NO_STARTS, RayBatch, reject
 from renderer.trace.layout import BLOCK_FACES, Tree
 from renderer.trace.ray_lanes import WIDTH
 from renderer.trace.rays import HitArrays
-from renderer.trace.single import FEW_DEPTH, trace_few
+from renderer.trace.single import FEW_DEPTH, UNRESOLVED, trace_carefully, trace_few
 from renderer.trace.traverse import Scratch, new_scratch, search_chunk, trace_chunk
 from renderer.trace.walk import stack_size
 
@@ -62,13 +62,16 @@ def _trace_few(
 ) -> None:
     """Write the closest hits of a few rays, on the caller's thread."""
     origins, directions, t_min, t_max, starts = rays
-    alone = starts is NO_STARTS
-    scratch = None if alone else _take_scratch(tree.depth)
-    row = entry_of(trace_few)(
-        tree.descriptor, origins, directions, t_min, t_max, ALONE if alone else starts, t, face, u, v, side, pile,
-        _NO_HIT, _NO_FACE if scratch is None else scratch.holders,
-    )  # fmt: skip
-    if scratch is not None:
+    row = UNRESOLVED
+    if starts is NO_STARTS:
+        row = entry_of(trace_few)(
+            tree.descriptor, origins, directions, t_min, t_max, ALONE, t, face, u, v, side, pile, _NO_HIT
+        )
+    if row == UNRESOLVED:
+        scratch, own = _take_scratch(tree.depth), ALONE if starts is NO_STARTS else starts
+        row = trace_carefully(
+            tree.descriptor, origins, directions, t_min, t_max, own, t, face, u, v, side, pile, _NO_HIT, scratch.holders
+        )
         _local.scratch = scratch
     if row >= 0:
         reject(rays, row, tree.scale)

@@ -1,5 +1,7 @@
 """Rays traced one by one: those of small batches, and those with uncertain hits."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
@@ -7,14 +9,16 @@ from renderer.numerics.kinds import of_none
 from renderer.numerics.simd import LOCAL_WORDS, is_negative, load, local_words, offset, pointer, store
 from renderer.trace.best import NO_FACE, Best, no_hit
 from renderer.trace.intersect import largest_of, make_shear
-from renderer.trace.leaf import nearest_carefully
+from renderer.trace.leaf import nearest_carefully, nearest_in_blocks
 from renderer.trace.rays import first_bad_ray, found_pointers, ray_at, ray_pointers, write_hit
-from renderer.trace.single_ray import Found, enter_counted, prepare_single
+from renderer.trace.single_ray import Found, enter_counted, enter_node, prepare_single
 from renderer.trace.starts.record import PILE
 from renderer.trace.starts.search import is_near_start, search_from, t_from
 from renderer.trace.trees import tree_pointers
 from renderer.trace.walk import stack_size, walk
 
+# What ``trace_few`` returns where a hit is uncertain.
+UNRESOLVED = -2
 # The levels of the deepest tree whose stack fits into a kernel's own frame.
 FEW_DEPTH = (LOCAL_WORDS - stack_size(0)) // 7
 
@@ -92,13 +96,52 @@ def count_from_start(tree, rays, i, best):
     return Best(t, best.face, best.u, best.v, best.w)
 
 
-@kernel
-def trace_few(descriptor, origins, directions, t_min, t_max, starts, t, face, u, v, side, pile, hit, holders):
-    """Closest hits of a few rays of a ``RayBatch``, one by one, to the arrays of a ``HitArrays``.
+class _Certain(NamedTuple):
+    """The best certain hit so far, and whether an uncertain one must be resolved."""
 
-    Returns the row of the first ray out of range, for which nothing is traced, or -1. The tree has at most FEW_DEPTH
-    levels.
+    best: Best
+    unresolved: bool
+
+
+@inlined
+def _enter_certainly(tree, single, node, found):
+    return found, enter_node(tree, node, single, found.best.t)[1]
+
+
+@inlined
+def _visit_certainly(tree, single, first, count, found):
+    best, unresolved = nearest_in_blocks(tree, first, count, single.ray.t_min, single.shear, found.best)
+    return _Certain(best, unresolved), unresolved
+
+
+@kernel
+def trace_few(descriptor, origins, directions, t_min, t_max, starts, t, face, u, v, side, pile, hit):
+    """Closest hits of a few rays of a ``RayBatch``, none of which starts on the surface, one by one, to the arrays of a
+    ``HitArrays``. The tree has at most FEW_DEPTH levels.
+
+    Returns the row of the first ray out of range, for which nothing is traced; UNRESOLVED where ``trace_carefully`` has
+    to trace them, for which most processes need not compile what resolves hits; or -1.
     """
+    tree, count = tree_pointers(descriptor), len(t)
+    source = ray_pointers(origins, directions, t_min, t_max, starts, tree.scale)
+    found = found_pointers(t, face, u, v, side, pile, hit)
+    bad = first_bad_ray(source, 0, count)
+    if bad >= 0:
+        return bad
+    stack = local_words()
+    for i in range(count):
+        ray, limit = ray_at(source, i)
+        single, nothing = prepare_single(ray), _Certain(no_hit(limit), False)
+        best, unresolved = walk(tree, stack, single, nothing, _enter_certainly, _visit_certainly)
+        if unresolved:
+            return UNRESOLVED
+        write_best(tree, source, found, i, best, 0.0, single.largest, single.shear.direction_z, False)
+    return -1
+
+
+@kernel
+def trace_carefully(descriptor, origins, directions, t_min, t_max, starts, t, face, u, v, side, pile, hit, holders):
+    """``trace_few`` with every uncertain hit resolved, also for rays that start on the surface. Returns the row or -1."""
     tree, count = tree_pointers(descriptor), len(t)
     source = ray_pointers(origins, directions, t_min, t_max, starts, tree.scale)
     found = found_pointers(t, face, u, v, side, pile, hit)

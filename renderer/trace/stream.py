@@ -20,6 +20,7 @@ from renderer.numerics.simd import (
     movemask,
     offset,
     prefetch,
+    set_first,
     splat4,
     splat8,
     store,
@@ -209,6 +210,18 @@ def meet_nodes(tree, rays, lanes, count):
 
 
 @inlined
+def meet_nodes_unsorted(tree, rays, lanes, count):
+    """``meet_nodes`` for queries that need not come to near octants first; all entries have the distance 0."""
+    for k in range(count):
+        r = load(lanes.at_node, k)
+        top, (nodes, links, base) = load(rays.integers, TOP + r), tree.ways.node_of(tree, rays, r)
+        lower, upper = splat8(load(rays.floats, LOWER + r)), splat8(load(rays.floats, LIMIT + r))
+        _, meets = meet_boxes(nodes, base, slabs_of(rays, r), lower, upper)
+        store(lanes.stacks, top, set_first(meets, links, base + CHILDREN))
+        store(rays.integers, TOP + r, top + count_bits(movemask(meets)))
+
+
+@inlined
 def begin_in_tree(tree, rays, prepared, r, number):
     """``Ways.begin`` of a mesh."""
 
@@ -316,11 +329,12 @@ def list_lane(lanes, r, child, counts):
 
 
 @inlined
-def run_lanes(tree, rays, prepared, lanes, counts, queue, most_rounds, query, meet, take, finish):
+def run_lanes(tree, rays, prepared, lanes, counts, queue, most_rounds, query, enter, meet, take, finish):
     """Trace the rays in lanes and those of a queue to their ends; none of the queue begins after ``most_rounds``
     rounds.
 
-    query   what the three kernels read
+    query   what the four kernels read
+    enter   enter(tree, query, lanes, count): ``meet_nodes`` of each ray at a node
     meet    meet(tree, query, lanes, count): compute the hits of each ray at a leaf in the first block of its leaf
     take    take(tree, query, k): take the hits of the k-th of them; returns whether the ray ends
     finish  finish(tree, query, r): finish the ray in lane r; returns the rounds that it took
@@ -337,7 +351,7 @@ def run_lanes(tree, rays, prepared, lanes, counts, queue, most_rounds, query, me
         rounds += 1
         # Take the rays at nodes one step on.
         entered, counts = counts.nodes, LaneCounts(np.int64(0), counts.leaves, counts.ends)
-        meet_nodes(tree, prepared, lanes, entered)
+        enter(tree, query, lanes, entered)
         for k in range(entered):
             r = load(lanes.at_node, k)
             counts = list_lane(lanes, r, resume(tree, rays, prepared, lanes, r), counts)

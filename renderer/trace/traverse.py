@@ -42,6 +42,8 @@ from renderer.trace.stream import (
     list_lane,
     make_lanes,
     meet_leaves,
+    meet_nodes,
+    meet_nodes_unsorted,
     resume,
     run_lanes,
     stack_of,
@@ -146,6 +148,14 @@ def _finish(tree, query, r):
 
 
 @inlined
+def _enter(tree, query, lanes, count):
+    if query.any_hit:
+        meet_nodes_unsorted(tree, query.scratch.prepared, lanes, count)
+    else:
+        meet_nodes(tree, query.scratch.prepared, lanes, count)
+
+
+@inlined
 def _meet(tree, query, lanes, count):
     meet_leaves(tree, query.scratch.prepared, lanes, count)
 
@@ -164,7 +174,7 @@ def _run(tree, query, counts, queue):
     """
     scratch = query.scratch
     return run_lanes(
-        tree, query.rays, scratch.prepared, scratch.lanes, counts, queue, _WORK, query, _meet, _take, _finish
+        tree, query.rays, scratch.prepared, scratch.lanes, counts, queue, _WORK, query, _enter, _meet, _take, _finish
     )
 
 

@@ -16,6 +16,7 @@ from typing import Any
 from renderer.errors import extra_hint
 from renderer.system.interrupt import interruptible
 from renderer.system.terminal import one_line
+from validation.benchmark.limited import limited, run_limited
 from validation.output import add_output, check_output
 
 # Rays or points of a family, in full and in quick runs.
@@ -29,6 +30,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     check_output(parser, options)
     given = sys.argv[1:] if arguments is None else list(arguments)
+    if options.avx2 and not limited():
+        return run_limited(given)
     try:
         return _run(options, ("python -m validation.benchmark " + shlex.join(given)).strip())
     except (ValueError, OSError, ImportError) as error:
@@ -42,6 +45,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--quick", action="store_true", help="200,000 rays, at most 100,000 faces, small pictures")
     parser.add_argument("--huge", action="store_true", help="a mesh of 10 million faces too")
     parser.add_argument("--mesh", type=Path, nargs="+", default=[], metavar="PATH", help="PLY, OBJ, STL or GLB as well")
+    parser.add_argument("--avx2", action="store_true", help="no more than AVX2: neither our kernels nor Embree's")
     add_output(parser, "where record and page go")
     parser.add_argument("--page-only", action="store_true", help="draw the page again from the stored record")
     return parser

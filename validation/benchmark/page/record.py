@@ -3,7 +3,8 @@
 schema            SCHEMA; another number is refused
 command, date, commit, quick, seconds      how the record was made; commit is null outside a git checkout
 environment       processor, processors, threads, python, platform, packages (version or null), libllvm (or null),
-                  load: mean number of processes that wanted to run in the minute before the run, or null
+                  load: mean number of processes that wanted to run in the minute before the run, or null;
+                  limited: the level of processors to which the run was limited, or null
 systems           by name: label, threads, precision, most_rays (null: no limit)
 missing           by name: how to install a peer that is absent
 series            names of the generated meshes, which differ in size only
@@ -58,6 +59,7 @@ from typing import Any
 
 from renderer.system.files import write_atomically
 from validation import environment
+from validation.benchmark.limited import limited
 from validation.benchmark.peers.contender import System
 
 SCHEMA = 9
@@ -73,7 +75,7 @@ def describe(libllvm: str | None, load: float | None) -> dict[str, Any]:
     """The environment: ``validation.environment`` and what only the benchmark uses."""
     found: dict[str, Any] = environment.describe()
     packages = {name: _version(name) for name in _MORE_PACKAGES}
-    return found | {"packages": found["packages"] | packages, "libllvm": libllvm, "load": load}
+    return found | {"packages": found["packages"] | packages, "libllvm": libllvm, "load": load, "limited": limited()}
 
 
 def described(systems: Sequence[System]) -> dict[str, Any]:
