@@ -63,19 +63,9 @@ def find_blocks(tree, rays, begin, end, scratch, found):
         store(found.counts, k, 0)
     none, queue = LaneCounts(np.int64(0), np.int64(0), np.int64(0)), Queue(found.numbers, np.int64(0), count)
     following, rounds = run_lanes(
-        tree,
-        rays,
-        scratch.prepared,
-        scratch.lanes,
-        none,
-        queue,
-        _ROUNDS,
-        query,
-        _enter,
-        _see_leaves,
-        _list_seen,
+        tree, rays, scratch.prepared, scratch.lanes, none, queue, _ROUNDS, query, _enter, _see_leaves, _list_seen,
         _finish,
-    )
+    )  # fmt: skip
     return begin + following, rounds * (MIN_ACTIVE // WIDTH)
 
 

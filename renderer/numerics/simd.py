@@ -635,7 +635,7 @@ _SET_FIRST = [sorted(range(8), key=lambda lane: mask >> lane & 1 == 0) for mask 
 
 @intrinsic
 def set_first(typingctx, mask, links, index):
-    """Eight int64 whose low words are int32, from ``index`` on of the ``pointer`` ``links``; those in the mask first."""
+    """Eight int64: the int32 from ``index`` on of the ``pointer`` ``links`` as low words, those in the mask first."""
 
     def codegen(context, builder, sig, args):
         byte, word, wide = (ir.IntType(bits) for bits in (8, 32, 64))

@@ -141,7 +141,7 @@ def trace_few(descriptor, origins, directions, t_min, t_max, starts, t, face, u,
 
 @kernel
 def trace_carefully(descriptor, origins, directions, t_min, t_max, starts, t, face, u, v, side, pile, hit, holders):
-    """``trace_few`` with every uncertain hit resolved, also for rays that start on the surface. Returns the row or -1."""
+    """``trace_few`` with uncertain hits resolved, also for rays that start on the surface; returns the row or -1."""
     tree, count = tree_pointers(descriptor), len(t)
     source = ray_pointers(origins, directions, t_min, t_max, starts, tree.scale)
     found = found_pointers(t, face, u, v, side, pile, hit)
