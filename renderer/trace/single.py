@@ -110,6 +110,7 @@ def _enter_certainly(tree, single, node, found):
 
 @inlined
 def _visit_certainly(tree, single, first, count, found):
+    # rule: blocks-of-few
     best, unresolved = nearest_in_blocks(tree, first, count, single.ray.t_min, single.shear, found.best)
     return _Certain(best, unresolved), unresolved
 
