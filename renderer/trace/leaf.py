@@ -52,11 +52,12 @@ def nearest_in_blocks(tree, first, count, t_min, shear, best):
         while bits != 0:
             i = lowest_bit(bits)
             bits &= bits - 1
-            ti = extract(hits.t, i)
+            ti, wi = extract(hits.t, i), extract(hits.w, i)
             fi = face_in(tree, block * BLOCK_FACES + i)
             # rule: tie-in-blocks
-            if ti >= t_min and (ti < t or (ti == t and fi < face)):
-                t, face, u, v, w = ti, fi, extract(hits.u, i), extract(hits.v, i), extract(hits.w, i)
+            nearer = ti >= t_min and (ti < t or (ti == t and fi < face))
+            if nearer and tree.ways.admits(tree, wi, shear.direction_z):
+                t, face, u, v, w = ti, fi, extract(hits.u, i), extract(hits.v, i), wi
     return Best(t, face, u, v, w), unresolved != 0
 
 

@@ -122,7 +122,7 @@ def test_the_heat_map_is_that_of_the_counted_steps(client: Client, prepared: Pre
     assert told["colors"][0] == [68, 1, 84] and told["colors"][-1] == [253, 231, 37]  # viridis
     # Rays through rounded directions may enter another box at its very edge.
     assert (got.rgb == shades_of(counts, counts.min(), high)).all(axis=2).mean() > 0.999
-    assert len(np.unique(counts)) > 3
+    assert len(np.unique(counts)) > 2
 
 
 def test_brute_force_tests_all_triangles_and_no_node(client: Client, prepared: PreparedScene) -> None:
