@@ -86,7 +86,7 @@ def _origin(run: Record, started: str, command: str) -> Record:
     """Where the figures come from; the commit where the sources are still those that ran."""
     around = run["environment"]
     known = run.get("commit") or (commit() if around["sources"] == sources_sha256() else None)
-    limit = ", limited to it" if around.get("limited") else ""
+    limit = ", ours limited to it" if around.get("limited") else ""
     return {
         "command": command, "machine": f"{around['processor']}, {around['processors']} cores, {_vectors(run)}{limit}",
         "commit": (known or f"sources {around['sources']}")[:15 if not known else 7], "date": started[:10],

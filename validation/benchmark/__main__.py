@@ -45,7 +45,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--quick", action="store_true", help="200,000 rays, at most 100,000 faces, small pictures")
     parser.add_argument("--huge", action="store_true", help="a mesh of 10 million faces too")
     parser.add_argument("--mesh", type=Path, nargs="+", default=[], metavar="PATH", help="PLY, OBJ, STL or GLB as well")
-    parser.add_argument("--avx2", action="store_true", help="no more than AVX2: neither our kernels nor Embree's")
+    parser.add_argument("--avx2", action="store_true", help="our kernels use no more than AVX2")
     add_output(parser, "where record and page go")
     parser.add_argument("--page-only", action="store_true", help="draw the page again from the stored record")
     return parser

@@ -4,7 +4,7 @@ schema            SCHEMA; another number is refused
 command, date, commit, quick, seconds      how the record was made; commit is null outside a git checkout
 environment       processor, processors, threads, python, platform, packages (version or null), libllvm (or null),
                   load: mean number of processes that wanted to run in the minute before the run, or null;
-                  limited: the level of processors to which the run was limited, or null
+                  limited: the level of processors to which our kernels were limited, or null
 systems           by name: label, threads, precision, most_rays (null: no limit)
 missing           by name: how to install a peer that is absent
 series            names of the generated meshes, which differ in size only
