@@ -28,6 +28,7 @@ from renderer.numerics.simd import (
     narrow,
     pointer,
     select,
+    set_first,
     splat4,
     splat8,
     square_root,
@@ -190,6 +191,20 @@ def test_octants_are_sorted_as_numpy_sorts_them(seed):
     order = met[np.argsort(kept[met] | met)[::-1]]
     expected = (kept[order] << 32) | links[2:][order].view(np.uint32).astype(np.int64)
     assert out[[0, -1]].tolist() == [77, 77] and out[1 : 1 + len(met)].tolist() == expected.tolist()
+
+
+@njit
+def gather_octants(distances, links, limit, out):
+    store(out, 1, set_first(load8(distances, 0) <= splat8(limit), pointer(links), 2))
+
+
+def test_octants_of_every_mask_come_first():
+    links, out = np.array([9, 9, -1, 5, -(2**31), 2**31 - 1, 0, 7, -7, 1], np.int32), np.full(10, 77)
+    for mask in range(256):
+        distances = np.where(mask >> np.arange(8) & 1, 1.0, np.nan).astype(np.float32)
+        gather_octants(distances, links, np.float32(2.0), out)
+        expected = links[2:][distances == 1.0].view(np.uint32).tolist()
+        assert out[[0, -1]].tolist() == [77, 77] and out[1 : 1 + len(expected)].tolist() == expected
 
 
 @njit

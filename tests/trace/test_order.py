@@ -12,6 +12,7 @@ from meshes import assert_same_hits, make_mesh, options, separate
 from numpy.random import Generator
 
 from renderer.jit.decorators import kernel
+from renderer.mesh.shapes import box
 from renderer.numerics.simd import extract
 from renderer.octree import BruteForce, Octree
 from renderer.results.hits import Hits
@@ -226,3 +227,21 @@ def test_a_hit_beyond_doubt_lies_within_its_own_box_and_so_within_all(seed):
     assert found[counted, 3].all()
     assert (found[counted, 2] > found[counted, 1]).any()
     assert (found[counted, 2] < found[counted, 1]).any()
+
+
+@cases("seed", range(5))
+def test_few_rays_amid_corners_and_edges_have_the_hits_of_many(seed):
+    """Where one of a few rays has an uncertain hit, all of them are traced by another kernel."""
+    rng, ends = np.random.default_rng(seed), np.tile([0.0, 0.5, 1.0, 0.3], 60)
+    octree, origins = Octree.from_mesh(box()), rng.permuted(ends).reshape(-1, 3)
+    origins[:, 2] += 3.0
+    directions = np.where(rng.random((len(origins), 1)) < 0.5, [0.0, 0.0, -1.0], rng.integers(-2, 3, (len(origins), 3)))
+    directions[~directions.any(axis=1)] = (0.0, 0.0, -1.0)
+    many = octree.closest_hit(origins, directions)
+    assert 0.2 < many.hit.mean() < 1.0
+    for count in (1, 3, 15):
+        for begin in range(0, len(origins) - count, count):
+            some = slice(begin, begin + count)
+            few = octree.closest_hit(origins[some], directions[some])
+            for name in ("t", "face", "u", "v", "side"):
+                np.testing.assert_array_equal(getattr(few, name), getattr(many, name)[some])
