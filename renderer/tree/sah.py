@@ -85,12 +85,14 @@ def _spread_bins(boxes, begin, end, apart, count):
     for i in range(begin, end, apart):
         centres = _centres(boxes, i)
         low, high = minimum(low, centres), maximum(high, centres)
-    return Bins(low, select(high > low, np.float32(count) / (high - low), np.float32(0.0)), np.int64(count))
+    # Infinite along an axis on which all centres are one, or closer together than float32 can tell.
+    scale = np.float32(count) / (high - low)
+    return Bins(low, select(scale < np.float32(np.inf), scale, np.float32(0.0)), np.int64(count))
 
 
 @inlined
 def _bins_of(centres, bins):
-    """The bin of a face on each axis, by its ``_centres``; the first where the scale is infinite and this is NaN."""
+    """The bin of a face on each axis, by its ``_centres``, which may lie before those of a sample or beyond them."""
     places = minimum((centres - bins.low) * bins.scale, np.float32(bins.count - 1))
     return maximum(splat8(np.float32(0.0)), places)
 

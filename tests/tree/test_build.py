@@ -238,6 +238,14 @@ def test_a_larger_leaf_size_never_costs_more():
         assert all(b <= a * (1 + 1e-6) for a, b in pairwise(costs))
 
 
+def test_a_tree_is_no_deeper_where_centres_are_too_close_for_bins():
+    """One face in each cut had made it 109 levels deep."""
+    corners = np.random.default_rng(0).random((9000, 3, 3)) * 1e-38
+    corners[0] = np.eye(3)
+    octree = Octree(corners.reshape(-1, 3), np.arange(27_000).reshape(-1, 3), split="sah")
+    assert octree.stats.depth < 20
+
+
 def test_sah_expects_less_than_the_midpoint():
     # Of a surface that octants do not suit; a sphere costs the same either way.
     for mesh in (torus(), torus(1.0, 0.1, 200, 40)):
