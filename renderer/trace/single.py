@@ -110,7 +110,6 @@ def _enter_certainly(tree, single, node, found):
 
 @inlined
 def _visit_certainly(tree, single, first, count, found):
-    # rule: blocks-of-few
     best, unresolved = nearest_in_blocks(tree, first, count, single.ray.t_min, single.shear, found.best)
     return _Certain(best, unresolved), unresolved
 
@@ -134,6 +133,7 @@ def trace_few(descriptor, origins, directions, t_min, t_max, starts, t, face, u,
         ray, limit = ray_at(source, i)
         single, nothing = prepare_single(ray), _Certain(no_hit(limit), False)
         best, unresolved = walk(tree, stack, single, nothing, _enter_certainly, _visit_certainly)
+        # rule: uncertain-of-few
         if unresolved:
             return UNRESOLVED
         write_best(tree, source, found, i, best, 0.0, single.largest, single.shear.direction_z, False)

@@ -110,7 +110,7 @@ _CHANGES: dict[str, Change] = {
     "any hit forgets what is near": Wrapped("any_hits", _any_beyond_one),
     "a packet of any hits drops what waits beyond eight octants": Rule("packet-stack", value("min(_, 8)")),
     "single rays skip a leaf's last block": Rule("blocks-of-leaf", argument(2, "max(_ - 1, 1)")),
-    "few rays skip a leaf's last block": Rule("blocks-of-few", argument(2, "max(_ - 1, 1)")),
+    "uncertain hits of few rays are left out": Rule("uncertain-of-few", drop),
     "single rays are an ulp too far": Wrapped("closest._trace_few", _few_an_ulp_farther),
     "bad rays are let through": Wrapped("closest.reject", lambda sound, *arguments: None),
     "places of hits off by 1e-9 of a corner": Wrapped("hits.points_on", _points_moved),
