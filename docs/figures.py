@@ -160,7 +160,7 @@ BLOCKS: dict[str, Callable[[Record], str]] = {
     "runs": runs, "errors": errors, "peers": peers, "rays": rays, "cells": cells, "points": points, "builds": builds,
     "drop_in": drop_in, "frames": frames,
     "viewer": lambda run: table(("from", "to", "milliseconds"), (row.values() for row in run["rows"])),
-    "note": lambda run: run.get("note", "All systems are of one run."),
+    "note": lambda run: run.get("note", "All systems are of one run"),
     "wrong": lambda run: f"{run['hits']['wrong']} wrong hits in {run['hits']['rays'] / 1e6:.1f} million rays",
     "lost": lambda run: "{ours} rays in {rays:.0f} million".format(
         ours=sum(of["ours"] for of in run["leaks"].values()), rays=sum(of["rays"] for of in run["leaks"].values()) / 1e6
