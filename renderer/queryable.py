@@ -144,7 +144,7 @@ class Queries:
         hits = closest_hits(built.tree, rays, built.mesh, self.threads)
         if t_error is not False and flag_argument("t_error", t_error):
             add_errors(hits, rays, None, built.tree.scale, self.threads)
-        return hits if len(shape) == 1 else hits.shaped(shape)
+        return hits.shaped(shape)
 
     def any_hit(
         self,

@@ -12,7 +12,7 @@ from renderer.numerics.simd import load, minimum, offset, store
 from renderer.trace.intersect import see_triangles
 from renderer.trace.layout import BLOCK_WORDS
 from renderer.trace.ray_lanes import CHILD, NUMBER, WIDTH, Prepared, shear_of
-from renderer.trace.stream import MIN_ACTIVE, LaneCounts, Lanes, Queue, clear_lanes, meet_nodes_unsorted, run_lanes
+from renderer.trace.stream import MIN_ACTIVE, LaneCounts, Lanes, Queue, clear_lanes, meet_nodes, run_lanes, unsorted
 from renderer.trace.walk import first_block
 
 # Rays that are searched for together, and the most blocks listed for each: twice as many as most rays through closed
@@ -71,7 +71,7 @@ def find_blocks(tree, rays, begin, end, scratch, found):
 
 @inlined
 def _enter(tree, query, lanes, count):
-    meet_nodes_unsorted(tree, query.prepared, lanes, count)
+    meet_nodes(tree, query.prepared, lanes, count, unsorted)
 
 
 @inlined

@@ -11,7 +11,7 @@ from renderer.trace.best import NO_FACE, Best
 from renderer.trace.intersect import Shear, Slabs, box_limit, largest_of, make_shear, make_slabs, round_down
 from renderer.trace.leaf import nearest_in_blocks
 from renderer.trace.rays import eight_rays_at
-from renderer.trace.starts.record import EDGE
+from renderer.trace.starts.record import EDGE, no_start
 from renderer.trace.walk import blocks_of
 
 WIDTH = 16
@@ -108,12 +108,7 @@ def _put_start(doubles, r, ray):
 @inlined
 def start_of(rays, r):
     """The ray's slack, and the face that it starts on."""
-    return of_none(rays.starts, _no_start, _start_in_lane)(rays.doubles, r)
-
-
-@inlined
-def _no_start(doubles, r):
-    return 0.0, -1.0
+    return of_none(rays.starts, no_start, _start_in_lane)(rays.doubles, r)
 
 
 @inlined

@@ -28,7 +28,7 @@ from renderer.numerics.simd import (
 )
 from renderer.trace.best import NO_FACE, side_of
 from renderer.trace.intersect import Ray
-from renderer.trace.starts.record import ALL, FACE, SLACK, start_pointers, start_row
+from renderer.trace.starts.record import ALL, FACE, SLACK, no_start, start_pointers, start_row
 
 _MOST, _TINIEST = np.finfo(np.float64).max, 2.0**-1074
 _BYTES = 8
@@ -180,7 +180,7 @@ def eight_rays_at(rays, numbers):
     direction = gather8(d, numbers, z, 0), gather8(d, numbers, z, 1), gather8(d, numbers, z, 2)
     # rule: ends-of-eight
     t_min, t_max = _often_one(rays.t_min, numbers, rays.min_step, 0), _often_one(rays.t_max, numbers, rays.max_step, 0)
-    slack, leaving = of_none(rays.starts, _no_starts8, starts8)(rays.starts, numbers)
+    slack, leaving = of_none(rays.starts, no_start, starts8)(rays.starts, numbers)
     slack, leaving = broadcast_like(slack, t_min), broadcast_like(leaving, t_min)
     return _scaled(origin, direction, t_min, t_max, rays.scale, slack, leaving, ALL, -1.0)
 
@@ -190,11 +190,6 @@ def _often_one(base, numbers, step, column):
     """``gather8`` for rows that all rays often share."""
     first = gather8(base, numbers, 0, column)
     return gather8(base, numbers, step, column) if step != 0 else first
-
-
-@inlined
-def _no_starts8(starts, numbers):
-    return 0.0, -1.0
 
 
 @inlined

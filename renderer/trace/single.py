@@ -10,11 +10,11 @@ from renderer.numerics.simd import LOCAL_WORDS, is_negative, load, local_words, 
 from renderer.trace.best import NO_FACE, Best, no_hit
 from renderer.trace.intersect import largest_of, make_shear
 from renderer.trace.leaf import nearest_carefully, nearest_in_blocks
-from renderer.trace.rays import first_bad_ray, found_pointers, ray_at, ray_pointers, write_hit
+from renderer.trace.rays import first_bad_ray, ray_at, write_hit
 from renderer.trace.single_ray import Found, enter_counted, enter_node, prepare_single
 from renderer.trace.starts.record import PILE
 from renderer.trace.starts.search import is_near_start, search_from, t_from
-from renderer.trace.trees import tree_pointers
+from renderer.trace.trees import call_pointers
 from renderer.trace.walk import stack_size, walk
 
 # What ``trace_few`` returns where a hit is uncertain.
@@ -122,9 +122,8 @@ def trace_few(descriptor, origins, directions, t_min, t_max, starts, t, face, u,
     Returns the row of the first ray out of range, for which nothing is traced; UNRESOLVED where ``trace_carefully`` has
     to trace them, for which most processes need not compile what resolves hits; or -1.
     """
-    tree, count = tree_pointers(descriptor), len(t)
-    source = ray_pointers(origins, directions, t_min, t_max, starts, tree.scale)
-    found = found_pointers(t, face, u, v, side, pile, hit)
+    call = call_pointers(descriptor, origins, directions, t_min, t_max, starts, t, face, u, v, side, pile, hit)
+    (tree, source, found), count = call, len(t)
     bad = first_bad_ray(source, 0, count)
     if bad >= 0:
         return bad
@@ -143,9 +142,8 @@ def trace_few(descriptor, origins, directions, t_min, t_max, starts, t, face, u,
 @kernel
 def trace_carefully(descriptor, origins, directions, t_min, t_max, starts, t, face, u, v, side, pile, hit, holders):
     """``trace_few`` with uncertain hits resolved, also for rays that start on the surface; returns the row or -1."""
-    tree, count = tree_pointers(descriptor), len(t)
-    source = ray_pointers(origins, directions, t_min, t_max, starts, tree.scale)
-    found = found_pointers(t, face, u, v, side, pile, hit)
+    call = call_pointers(descriptor, origins, directions, t_min, t_max, starts, t, face, u, v, side, pile, hit)
+    (tree, source, found), count = call, len(t)
     bad = first_bad_ray(source, 0, count)
     if bad >= 0:
         return bad

@@ -195,29 +195,29 @@ def wait_octant(prepared, lanes, r, entry, child):
 
 
 @inlined
-def meet_nodes(tree, rays, lanes, count):
-    """For each of ``count`` rays, push the octants of its node that it enters, the nearest last.
+def nearest_last(meets, distances, links, index):
+    """Entries of the octants that a ray enters, the nearest last; others may follow."""
+    return farthest_first(meets, distances, links, index)
 
-    No branch: all eight are sorted and written, and the top moves by the number entered.
+
+@inlined
+def unsorted(meets, distances, links, index):
+    """``nearest_last`` for queries that need not come to near octants first: in any order, all with the distance 0."""
+    return set_first(meets, links, index)
+
+
+@inlined
+def meet_nodes(tree, rays, lanes, count, order):
+    """For each of ``count`` rays, push the octants of its node that it enters, by ``nearest_last`` or ``unsorted``.
+
+    No branch: all eight are written, and the top moves by the number entered.
     """
     for k in range(count):
         r = load(lanes.at_node, k)
         top, (nodes, links, base) = load(rays.integers, TOP + r), tree.ways.node_of(tree, rays, r)
         lower, upper = splat8(load(rays.floats, LOWER + r)), splat8(load(rays.floats, LIMIT + r))
         t0, meets = meet_boxes(nodes, base, slabs_of(rays, r), lower, upper)
-        store(lanes.stacks, top, farthest_first(meets, t0, links, base + CHILDREN))
-        store(rays.integers, TOP + r, top + count_bits(movemask(meets)))
-
-
-@inlined
-def meet_nodes_unsorted(tree, rays, lanes, count):
-    """``meet_nodes`` for queries that need not come to near octants first; all entries have the distance 0."""
-    for k in range(count):
-        r = load(lanes.at_node, k)
-        top, (nodes, links, base) = load(rays.integers, TOP + r), tree.ways.node_of(tree, rays, r)
-        lower, upper = splat8(load(rays.floats, LOWER + r)), splat8(load(rays.floats, LIMIT + r))
-        _, meets = meet_boxes(nodes, base, slabs_of(rays, r), lower, upper)
-        store(lanes.stacks, top, set_first(meets, links, base + CHILDREN))
+        store(lanes.stacks, top, order(meets, t0, links, base + CHILDREN))
         store(rays.integers, TOP + r, top + count_bits(movemask(meets)))
 
 

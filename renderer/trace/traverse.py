@@ -24,7 +24,7 @@ from renderer.trace.ray_lanes import (
     prepare_eight,
     start_of,
 )
-from renderer.trace.rays import HitPointers, RayPointers, first_bad_ray, found_pointers, ray_at, ray_pointers
+from renderer.trace.rays import HitPointers, RayPointers, first_bad_ray, ray_at
 from renderer.trace.single import search_carefully, write_best
 from renderer.trace.stack_entry import octant_of
 from renderer.trace.starts.cone import HOLDERS_WORDS
@@ -43,14 +43,15 @@ from renderer.trace.stream import (
     make_lanes,
     meet_leaves,
     meet_nodes,
-    meet_nodes_unsorted,
+    nearest_last,
     resume,
     run_lanes,
     stack_of,
     take_hits,
+    unsorted,
     wait_octant,
 )
-from renderer.trace.trees import tree_pointers
+from renderer.trace.trees import call_pointers
 from renderer.trace.walk import stack_size
 
 # The rounds of lanes in a call, beside those of the rays under way then: some 10 ms, so that Ctrl-C need not wait for
@@ -150,9 +151,9 @@ def _finish(tree, query, r):
 @inlined
 def _enter(tree, query, lanes, count):
     if query.any_hit:
-        meet_nodes_unsorted(tree, query.scratch.prepared, lanes, count)
+        meet_nodes(tree, query.scratch.prepared, lanes, count, unsorted)
     else:
-        meet_nodes(tree, query.scratch.prepared, lanes, count)
+        meet_nodes(tree, query.scratch.prepared, lanes, count, nearest_last)
 
 
 @inlined
@@ -308,9 +309,8 @@ def trace_chunk(
     Returns the three numbers of the ``Progress``, and the row of the first ray out of range, or -1; if there is one,
     nothing is traced. Plain numbers, as Numba would call Python to make a named tuple, and crash if Ctrl-C came then.
     """
-    tree = tree_pointers(descriptor)
-    source = ray_pointers(origins, directions, t_min, t_max, starts, tree.scale)
-    found, progress = found_pointers(t, face, u, v, side, pile, hit), Progress(begin, following, count)
+    call = call_pointers(descriptor, origins, directions, t_min, t_max, starts, t, face, u, v, side, pile, hit)
+    (tree, source, found), progress = call, Progress(begin, following, count)
     bad = first_bad_ray(source, begin, end)
     if bad < 0:
         query = _Query(source, found, scratch_pointers(scratch, source.starts), any_hit)
@@ -323,9 +323,8 @@ def search_chunk(
     descriptor, origins, directions, t_min, t_max, starts, t, face, u, v, side, pile, hit, any_hit, holders, begin, end
 ):  # fmt: skip
     """Hits of the rays begin:end, as ``trace_chunk`` writes them, for a tree without nodes; returns the row or -1."""
-    tree = tree_pointers(descriptor)
-    source = ray_pointers(origins, directions, t_min, t_max, starts, tree.scale)
-    found = found_pointers(t, face, u, v, side, pile, hit)
+    call = call_pointers(descriptor, origins, directions, t_min, t_max, starts, t, face, u, v, side, pile, hit)
+    tree, source, found = call
     bad = first_bad_ray(source, begin, end)
     if bad < 0:
         search_blocks(tree, source, found, begin, end, pointer(holders), any_hit)

@@ -11,6 +11,7 @@ from renderer.trace.instances import scene_pointers
 from renderer.trace.intersect import corners_of_block, face_of_block
 from renderer.trace.layout import BLOCK_COUNT, BLOCKS, DEPTH, FACES, NODES, SCALE, WIDE
 from renderer.trace.packet import trace_packet
+from renderer.trace.rays import HitPointers, RayPointers, found_pointers, ray_pointers
 from renderer.trace.single_ray import enter_node_of_tree
 from renderer.trace.starts.record import corners_of_mesh
 from renderer.trace.stream import begin_in_tree, node_in_tree, resume_in_tree
@@ -55,6 +56,22 @@ def _mesh_pointers(descriptor):
             enter_node_of_tree, begin_in_tree, node_in_tree, resume_in_tree, may_hit_all, admits_all, trace_packet,
         ),
     )  # fmt: skip
+
+
+class Call(NamedTuple):
+    """What a call of Python traces: the tree, the ``RayPointers`` and the ``HitPointers``."""
+
+    tree: TreePointers
+    rays: RayPointers
+    found: HitPointers
+
+
+@inlined
+def call_pointers(descriptor, origins, directions, t_min, t_max, starts, t, face, u, v, side, pile, hit):
+    """The ``Call`` with the arrays of a ``RayBatch`` and those of a ``HitArrays``."""
+    tree = tree_pointers(descriptor)
+    rays = ray_pointers(origins, directions, t_min, t_max, starts, tree.scale)
+    return Call(tree, rays, found_pointers(t, face, u, v, side, pile, hit))
 
 
 @inlined

@@ -45,7 +45,7 @@ def cut_sah(faces, tree, part, count, scratch):
     """
     begin, end = tree.ranges[part]
     # Sort the faces into bins.
-    apart = minimum(_MOST_APART, (end - begin) // _SAMPLE - 1 | 1) if end - begin > 2 * _SAMPLE else 1
+    apart = minimum(_MOST_APART, maximum(1, (end - begin) // _SAMPLE - 1 | 1))
     bins = _spread_bins(faces.boxes, begin, end, apart, _MOST_BINS if end - begin > 32 else 6)
     _fill_bins(faces.boxes, begin, end, apart, bins, scratch)
     # Take the cheapest plane between bins.

@@ -78,6 +78,12 @@ def _pointers(starts):
 
 
 @inlined
+def no_start(source, i):
+    """Slack and face of a ray that starts on no surface."""
+    return 0.0, -1.0
+
+
+@inlined
 def start_row(starts, i):
     """Slack, face, mask and ignored instance of ray ``i``."""
     return of_none(starts, _usual_row, _own_row)(starts, i)
@@ -85,7 +91,7 @@ def start_row(starts, i):
 
 @inlined
 def _usual_row(starts, i):
-    return 0.0, -1.0, ALL, -1.0
+    return *no_start(starts, i), ALL, -1.0
 
 
 @inlined
