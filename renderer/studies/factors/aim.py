@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.distance.on_surface import SurfacePoints
 from renderer.jit.decorators import inlined, kernel
 from renderer.mesh.mesh import Mesh
 from renderer.numerics.mixing import mixed
@@ -38,6 +39,7 @@ class Senders(NamedTuple):
     corners  (m, 9) float64: the first corner of a member, and the two sides from there; 0 for the sides of a point
     frames   (m, 9) float64: three unit vectors, the last the normal
     both     (m,) bool: whether it sends from both sides
+    above    (m,) bool: whether the frame's normal is on the side of the face's
     """
 
     first: NDArray[np.int64]
@@ -46,6 +48,7 @@ class Senders(NamedTuple):
     corners: NDArray[np.float64]
     frames: NDArray[np.float64]
     both: NDArray[np.bool_]
+    above: NDArray[np.bool_]
 
 
 def senders_of(mesh: Mesh, surfaces: Surfaces) -> Senders:
@@ -54,14 +57,26 @@ def senders_of(mesh: Mesh, surfaces: Surfaces) -> Senders:
     faces = faces[np.argsort(surfaces.of_face[faces], kind="stable")]
     rows, weights = surfaces.of_face[faces], surfaces.weights[faces]
     first = np.searchsorted(rows, np.arange(surfaces.number + 1))
-    ends = np.empty(len(faces))
-    for begin, end in zip(first[:-1], first[1:], strict=True):
-        sums = np.cumsum(weights[begin:end])
-        ends[begin:end] = sums / sums[-1]
+    sums = np.cumsum(weights)
+    before = np.concatenate([[0.0], sums])[first[:-1]]
+    ends = (sums - before[rows]) / surfaces.areas[rows]
+    ends[first[1:] - 1] = 1.0
     corners = mesh.vertices[mesh.faces[faces]]
     corners[:, 1:] -= corners[:, :1]
     normals = np.cross(corners[:, 1], corners[:, 2])
-    return Senders(first, faces, ends, corners.reshape(-1, 9), frames_of(normals), surfaces.both[faces])
+    above = np.ones(len(faces), np.bool_)
+    return Senders(first, faces, ends, corners.reshape(-1, 9), frames_of(normals), surfaces.both[faces], above)
+
+
+def senders_at(points: SurfacePoints, places: NDArray[np.float64], normals: NDArray[np.float64], mesh: Mesh) -> Senders:
+    """Points (m, 3) as senders, a row each; their normals (m, 3), not zero, say on which side of a face they lie."""
+    count, faces = len(places), points.faces
+    corners = np.zeros((count, 9))
+    corners[:, :3] = places
+    # A normal in the plane of its face belongs to the front.
+    above = (normals * mesh.face_normals()[faces]).sum(axis=1) >= 0.0
+    first, ends, both = np.arange(count + 1), np.ones(count), np.zeros(count, np.bool_)
+    return Senders(first, faces, ends, corners, frames_of(normals), both, above)
 
 
 def frames_of(normals: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -109,10 +124,12 @@ def _direction(frame, u, v, side):
 
 
 @kernel
-def aim_rows(first, members, ends, corners, frames, both, shifts, rows, begin, count, origins, directions, faces, codes):
+def aim_rows(
+    first, members, ends, corners, frames, both, above, shifts, rows, begin, count, origins, directions, faces, codes
+):  # fmt: skip
     """Write the rays from ``begin`` on, ``count`` of each of the rows, one row after the other.
 
-    first, members ... both  the arrays of ``Senders``
+    first, members ... above  the arrays of ``Senders``
     shifts                   those of the rows
     origins, directions      (rows * count, 3) float64
     faces, codes             (rows * count,) int64: the face that each ray leaves, and the bits of ``starts.record``
@@ -136,4 +153,4 @@ def aim_rows(first, members, ends, corners, frames, both, shifts, rows, begin, c
             u, v = _unit(load(shift, 2), index, _STEP_2), _unit(load(shift, 3), index, _STEP_3)
             put3(pointer(directions), 3 * i, _direction(frame, u, v, side))
             store(pointer(faces), i, members[member])
-            store(pointer(codes), i, np.int64(KNOWN | (ABOVE if side > 0.0 else 0)))
+            store(pointer(codes), i, np.int64(KNOWN | (ABOVE if (side > 0.0) == above[member] else 0)))

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import warnings
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +15,10 @@ from renderer.errors import expect
 from renderer.queryable import Queries
 from renderer.rayscene.scene import RayScene
 from renderer.studies.factors.aim import senders_of
-from renderer.studies.factors.balance import Exchanges, balanced
+from renderer.studies.factors.assemble import assembled
 from renderer.studies.factors.known import KnownPairs, known_of, pairs_worth
-from renderer.studies.factors.result import ViewFactors, csr_array
-from renderer.studies.factors.rows import BACK, FIRST_RAYS, SKY, RowHits, Tracing, nothing_known, trace_rows
+from renderer.studies.factors.result import ViewFactors
+from renderer.studies.factors.rows import FIRST_RAYS, RowHits, Tracing, nothing_known, trace_rows
 from renderer.studies.factors.sparse import scipy_sparse
 from renderer.studies.factors.surfaces import check_surfaces
 from renderer.studies.share import octree_of
@@ -32,8 +31,6 @@ Integers = NDArray[np.int64]
 _MOST_RAYS = 1 << 24
 # A row whose exact entries leave so little needs no rays: some roundings of their sum.
 _WHOLE = 1e-9
-# What may change of an exact entry beside others, where rays alone do not fill the rows.
-_LITTLE = 1e-9
 
 
 def view_factors(
@@ -115,7 +112,7 @@ def view_factors(
     >>> factors.sky.round(4)
     array([0.2   , 0.2   , 0.2   , 0.2   , 0.1998])
     """
-    sparse = scipy_sparse()
+    scipy_sparse()
     searched = octree_of(octree)
     surfaces = check_surfaces(searched.mesh, groups, sides, transmittance)
     rtol, max_rays = check_effort(rtol, max_rays)
@@ -127,7 +124,7 @@ def view_factors(
     left = surfaces.areas - pairs.sums(surfaces.number) > _WHOLE * surfaces.areas
     rows = np.flatnonzero(left)
     hits = trace_rows(tracing, rows, pairs.known(surfaces.areas))
-    return _assembled(sparse, surfaces.areas, pairs, _spread(hits, rows, surfaces.number))
+    return assembled(surfaces.areas, pairs, _spread(hits, rows, surfaces.number))
 
 
 def check_effort(rtol: float, max_rays: int) -> tuple[float, int]:
@@ -153,84 +150,3 @@ def _spread(hits: RowHits, rows: Integers, number: int) -> RowHits:
     lengths, rays = np.zeros((2, number), np.int64)
     lengths[rows], rays[rows] = np.diff(hits.first), hits.rays
     return hits._replace(first=np.concatenate([[0], np.cumsum(lengths)]), rays=rays)
-
-
-class _Counted(NamedTuple):
-    """The entries that rays counted, each surface pair once: rows <= columns."""
-
-    rows: Integers
-    columns: Integers
-    values: Floats
-    freedom: Floats
-    variance: Floats
-
-
-def _counted(hits: RowHits, areas: Floats) -> _Counted:
-    """The exchanges of pairs by the rays of both: their hits over the rays by area of both."""
-    number = len(areas)
-    rows = np.repeat(np.arange(number), np.diff(hits.first))
-    inner = hits.targets < number
-    rows, columns, counts = rows[inner], hits.targets[inner], hits.counts[inner]
-    density = hits.rays / areas
-    # The error of a row's own estimate, weighed as its rays are.
-    spread = (hits.errors[inner] * hits.rays[rows]) ** 2
-    low, high = np.minimum(rows, columns), np.maximum(rows, columns)
-    order = np.argsort(low * number + high, kind="stable")
-    low, high = low[order], high[order]
-    begins = np.flatnonzero(np.diff(low * number + high, prepend=-1))
-    low, high = low[begins], high[begins]
-    both = np.where(low == high, density[low], density[low] + density[high])
-    # rule: reciprocal-exchange
-    values = np.add.reduceat(counts[order].astype(np.float64), begins) / both if len(begins) else np.empty(0)
-    variance = np.add.reduceat(spread[order], begins) / both**2 if len(begins) else np.empty(0)
-    return _Counted(low, high, values, 1.0 / both, variance)
-
-
-def _outside(hits: RowHits, areas: Floats, target: int) -> Floats:
-    """The exchange of each row with the sky or with backs."""
-    number = len(areas)
-    rows = np.repeat(np.arange(number), np.diff(hits.first))
-    chosen = hits.targets == number + target
-    counts = np.bincount(rows[chosen], hits.counts[chosen], number)
-    return np.divide(counts * areas, hits.rays, out=np.zeros(number), where=hits.rays > 0)
-
-
-def _assembled(sparse: object, areas: Floats, pairs: KnownPairs, hits: RowHits) -> ViewFactors:
-    """The result: exact and counted entries, balanced."""
-    number, counted = len(areas), _counted(hits, areas)
-    sky, backs = _outside(hits, areas, SKY), _outside(hits, areas, BACK)
-    outside_freedom = np.divide(areas, hits.rays, out=np.zeros(number), where=hits.rays > 0)
-    rows, columns = np.concatenate([pairs.rows, counted.rows]), np.concatenate([pairs.columns, counted.columns])
-    values = np.concatenate([pairs.values, counted.values])
-    freedom = np.concatenate([np.zeros(len(pairs.rows)), counted.freedom])
-    variance = np.concatenate([np.zeros(len(pairs.rows)), counted.variance])
-    given = Exchanges(rows, columns, values, freedom, sky + backs, outside_freedom)
-    found = balanced(given, areas)
-    # What rays alone cannot fill: exact entries change as little as that leaves open.
-    found = balanced(found._replace(freedom=np.maximum(freedom, _LITTLE * areas.mean())), areas)
-    share = np.divide(found.outside, sky + backs, out=np.zeros(number), where=sky + backs > 0.0)
-    _warn_of_backs(backs * share / areas)
-    used = found.values > 0.0
-    rows, columns, values, variance = rows[used], columns[used], found.values[used], variance[used]
-    exchange = _symmetric(sparse, rows, columns, values, number)
-    errors = _symmetric(sparse, rows, columns, np.sqrt(variance), number)
-    errors.data /= np.repeat(areas, np.diff(errors.indptr))
-    return ViewFactors(areas, exchange, sky * share / areas, backs * share / areas, errors, hits.rays)
-
-
-def _symmetric(sparse: object, rows: Integers, columns: Integers, values: Floats, number: int) -> csr_array:
-    """The symmetric matrix of entries with rows <= columns."""
-    beside = rows != columns
-    places = np.concatenate([rows, columns[beside]]), np.concatenate([columns, rows[beside]])
-    return sparse.csr_array((np.concatenate([values, values[beside]]), places), shape=(number, number))
-
-
-def _warn_of_backs(backs: Floats) -> None:
-    seen = np.flatnonzero(backs)
-    if len(seen):
-        worst = int(backs.argmax())
-        warnings.warn(
-            f"octree: {len(seen)} of {len(backs)} surfaces see backs of faces, surface {worst} most: "
-            f"{100.0 * backs[worst]:.3g} % of what it sends; turn these faces, or pass sides='both'",
-            stacklevel=3,
-        )

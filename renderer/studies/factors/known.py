@@ -66,7 +66,7 @@ def pairs_worth(tracing: Tracing, hits: RowHits | None) -> Worth | None:
         return Worth(*np.triu_indices(number))
     if hits is None:
         return None
-    rows = np.repeat(np.arange(number), np.diff(hits.first))
+    rows = hits.rows
     factors = hits.counts / hits.rays[rows]
     inner = hits.targets < number
     # Entries of each row by size; those outside, which rays alone find, do not end up among them.

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.mesh.mesh import Mesh
 from renderer.numerics.mixing import mixed
 from renderer.queryable import Built
 from renderer.results.hits import Hits
@@ -17,7 +16,7 @@ from renderer.studies.factors.surfaces import Surfaces
 from renderer.studies.factors.tally import tally_rows
 from renderer.system.terminal import progress_bar
 from renderer.system.threads import for_chunks
-from renderer.trace.batch import CHUNK, Leaving, RayBatch, make_starts, offset_origins, reject
+from renderer.trace.batch import CHUNK, Leaving, RayBatch, offset_origins, reject
 from renderer.trace.closest import find_range
 from renderer.trace.leaving import check_leaving
 from renderer.trace.rays import HitArrays
@@ -59,6 +58,17 @@ class RowHits(NamedTuple):
     counts: Integers
     errors: Floats
     rays: Integers
+
+    @property
+    def rows(self) -> Integers:
+        """The row of each target, (k,)."""
+        return np.repeat(np.arange(len(self.rays)), np.diff(self.first))
+
+    def share(self, target: int) -> Floats:
+        """The share of each row's rays that ended at a target, (n,)."""
+        chosen, count = self.targets == target, len(self.rays)
+        hits = np.bincount(self.rows[chosen], self.counts[chosen], count)
+        return np.divide(hits, self.rays, out=np.zeros(count), where=self.rays > 0)
 
 
 class Tracing(NamedTuple):
@@ -105,9 +115,7 @@ def _trace_until(
         places, keys = places[unfinished], keys[unfinished]
 
 
-def _tally(
-    keys: Integers, rows: Integers, known: Known, rtol: float, last: bool
-) -> tuple[RowHits, NDArray[np.bool_]]:
+def _tally(keys: Integers, rows: Integers, known: Known, rtol: float, last: bool) -> tuple[RowHits, NDArray[np.bool_]]:
     """What rows hit by their sorted keys, of those that need no more rays; and which of them do."""
     count, rays = keys.shape
     targets, counts = np.empty((2, count * rays), np.int64)

@@ -1,4 +1,4 @@
-"""The surfaces between which view factors are computed: faces, or groups of faces, and the sides that they send from."""
+"""The surfaces between which view factors are computed: faces or groups of them, and the sides that they send from."""
 
 from __future__ import annotations
 

@@ -2,8 +2,6 @@
 
 import math
 
-import numpy as np
-
 from renderer.jit.decorators import kernel
 from renderer.studies.factors.aim import REPLICATES
 
