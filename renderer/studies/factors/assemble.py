@@ -65,7 +65,6 @@ def assembled(areas: Floats, pairs: KnownPairs, hits: RowHits) -> ViewFactors:
     # What rays alone cannot fill: exact entries change as little as that leaves open.
     found = balanced(found._replace(freedom=np.maximum(freedom, _LITTLE * areas.mean())), areas)
     share = np.divide(found.outside, sky + backs, out=np.zeros(number), where=sky + backs > 0.0)
-    warn_of_backs(backs * share / areas)
     used = found.values > 0.0
     rows, columns, values, variance = rows[used], columns[used], found.values[used], variance[used]
     exchange = _symmetric(rows, columns, values, number)
@@ -82,11 +81,12 @@ def _symmetric(rows: Integers, columns: Integers, values: Floats, number: int) -
 
 
 def warn_of_backs(backs: Floats) -> None:
+    """Warn the caller of the function that calls this one of rows that see backs."""
     seen = np.flatnonzero(backs)
     if len(seen):
         worst = int(backs.argmax())
         warnings.warn(
             f"octree: {len(seen)} of {len(backs)} surfaces see backs of faces, surface {worst} most: "
             f"{100.0 * backs[worst]:.3g} % of what it sends; turn these faces, or pass sides='both'",
-            stacklevel=4,
+            stacklevel=3,
         )

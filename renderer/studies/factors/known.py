@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.studies.factors.pairs import exact_pairs
 from renderer.studies.factors.rows import Known, RowHits, Tracing
 from renderer.studies.factors.surfaces import Surfaces
-from renderer.system.terminal import progress_bar
+from renderer.studies.factors.work import Work
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -104,7 +103,7 @@ def _cheapest(first: Integers, rows: Integers, cost: Floats, rays: Floats) -> ND
     return (place < stop[rows]) & np.isfinite(cost)
 
 
-def known_of(tracing: Tracing, worth: Worth) -> KnownPairs:
+def known_of(tracing: Tracing, worth: Worth, work: Work) -> KnownPairs:
     """The pairs among those worth it that are proven for all their faces, with their exchange."""
     surfaces = tracing.surfaces
     order = np.argsort(surfaces.of_face, kind="stable")
@@ -122,8 +121,7 @@ def known_of(tracing: Tracing, worth: Worth) -> KnownPairs:
     pair, first, second = pair[once], first[once], second[once]
     faces = np.stack([np.minimum(first, second), np.maximum(first, second)], axis=1)
     sound = ~surfaces.both[faces].any(axis=1)
-    with progress_bar(len(faces), "pair", tracing.progress) as update:
-        exchange, known = exact_pairs(tracing.built, faces, tracing.threads, update)
+    exchange, known = work.pairs(tracing, faces)
     unknown = np.bincount(pair, ~(known & sound), len(sizes)) > 0
     values = np.bincount(pair, exchange, len(sizes)) * np.where(own, 2.0, 1.0)
     kept = ~unknown

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +14,6 @@ from renderer.results.hits import Hits
 from renderer.studies.factors.aim import REPLICATES, WEYL, Senders, aim_rows, shifts_of
 from renderer.studies.factors.surfaces import Surfaces
 from renderer.studies.factors.tally import tally_rows
-from renderer.system.terminal import progress_bar
 from renderer.system.threads import for_chunks
 from renderer.trace.batch import CHUNK, Leaving, RayBatch, offset_origins, reject
 from renderer.trace.closest import find_range
@@ -23,6 +22,8 @@ from renderer.trace.rays import HitArrays
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+# Is called with the rows done, or pairs, since the last call.
+Update = Callable[[int], object] | None
 
 # The rays of a row at first: the least that tells a share of a hundredth from one of a fiftieth.
 FIRST_RAYS = 256
@@ -88,16 +89,15 @@ def nothing_known(rows: int) -> Known:
     return Known(np.zeros(rows + 1, np.int64), np.empty(0, np.int64), np.zeros(rows))
 
 
-def trace_rows(tracing: Tracing, rows: Integers, known: Known) -> RowHits:
-    """Trace the rays of some rows; ``known`` has all rows."""
+def trace_rows(tracing: Tracing, rows: Integers, known: Known, update: Update = None) -> RowHits:
+    """Trace the rays of some rows; ``known`` has all rows. What a row hits does not depend on the others."""
     parts: list[tuple[Integers, RowHits]] = []
-    with progress_bar(len(rows), "surface", tracing.progress) as update:
 
-        def trace(begin: int, end: int) -> Iterator[None]:
-            yield from _trace_until(tracing, begin + np.arange(end - begin), rows, known, parts)
+    def trace(begin: int, end: int) -> Iterator[None]:
+        yield from _trace_until(tracing, begin + np.arange(end - begin), rows, known, parts)
 
-        for_chunks(trace, len(rows), _ROWS, tracing.threads, update)
-    return _in_order(parts, len(rows))
+    for_chunks(trace, len(rows), _ROWS, tracing.threads, update)
+    return in_order(parts, len(rows))
 
 
 def _trace_until(
@@ -132,7 +132,7 @@ def _tally(keys: Integers, rows: Integers, known: Known, rtol: float, last: bool
     return RowHits(ends, targets[used], counts[used], errors[used], np.full(len(ends) - 1, rays)), unfinished
 
 
-def _in_order(parts: list[tuple[Integers, RowHits]], rows: int) -> RowHits:
+def in_order(parts: list[tuple[Integers, RowHits]], rows: int) -> RowHits:
     """The hits of rows at their places, from records of some rows each."""
     places = np.concatenate([part[0] for part in parts]) if parts else np.empty(0, np.int64)
     order = np.argsort(places, kind="stable")
