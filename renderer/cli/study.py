@@ -1,4 +1,7 @@
-"""``octree-render study``: arguments in, a study's result as an array, a coloured mesh, or a picture."""
+"""``octree-render study``: arguments in, a study's result as an array, a coloured mesh, or a picture.
+
+View factors, the kind without points, are in ``renderer.cli.view_factors``.
+"""
 
 import argparse
 from pathlib import Path
@@ -7,13 +10,25 @@ from typing import Any, NamedTuple
 from renderer.cli.cluster import add_cluster, on_cluster
 from renderer.cli.meshes import Files, kept_of, load_files, say_up, up_of, values_of_files
 from renderer.cli.render import resolution
+from renderer.cli.view_factors import add_view_factors, study_view_factors
 from renderer.errors import expect
 from renderer.system.terminal import say
 
 FORMATS = (".npy", ".ply", ".png")
 _KINDS = {"sky": "sky view factor", "sun": "hours of sun", "ao": "ambient occlusion"}
-# Options that one kind alone has, which are its function's.
-_OWN = {"sky": ("patches", "definition"), "sun": ("suns",), "ao": ("samples",)}
+_VIEW_FACTORS = "viewfactors"
+# Options that one kind alone has.
+_OWN = {
+    "sky": ("patches", "definition"),
+    "sun": ("suns",),
+    "ao": ("samples",),
+    _VIEW_FACTORS: ("groups", "sides", "rtol", "max_rays", "transmittance"),
+}
+# Options that all kinds have but view factors, and what they are where they are not given.
+_OF_POINTS = {
+    "up": None, "faces": False, "vertices": False, "grid": None, "points": None, "height": None, "bounds": None,
+    "max_distance": float("inf"), "camera": None, "resolution": None,
+}  # fmt: skip
 _MESH = (
     "mesh files (.ply, .obj, .stl, .glb, .gltf), or folders of them; several are one mesh, and the summary has the "
     "values of each"
@@ -45,19 +60,20 @@ def add_study(commands: Any) -> None:
     """Add the command to a parser's ``commands``."""
     study = commands.add_parser(
         "study",
-        help="what points of a mesh see: the sky, the sun, their surroundings",
-        description="Compute what points of a mesh see. If a long run is killed, the same command goes on where it "
+        help="what points of a mesh see: the sky, the sun, their surroundings; and view factors",
+        description="Compute what points or surfaces of a mesh see. If a long run is killed, the same command goes on where it "
         "stopped and ends with the same bits: parts that are done are kept beside the output.",
     )
-    study.add_argument("kind", choices=_KINDS, help="; ".join(f"{k}: {said}" for k, said in _KINDS.items()))
+    kinds = _KINDS | {_VIEW_FACTORS: "view factors between surfaces, and from them to the sky"}
+    study.add_argument("kind", choices=kinds, help="; ".join(f"{k}: {said}" for k, said in kinds.items()))
     study.add_argument("mesh", type=Path, nargs="+", help=_MESH)
     study.add_argument("--up", choices=("x", "y", "z"), help=_UP)
     study.add_argument("--hide", action="append", default=[], metavar="NAME", help=_HIDE)
     _add_places(study)
     study.add_argument(
         "-o", "--output", type=Path, required=True, action="append", metavar="FILE",
-        help=".npy: values; .ply: a mesh or points with values and colours; .png: a picture, not of points; may be "
-        "given again",
+        help=".npy: values; .ply: a mesh or points with values and colours; .png: a picture, not of points; view "
+        "factors: .npz with all arrays, .csv with a column for each surface; may be given again",
     )  # fmt: skip
     study.add_argument("--patches", type=int, metavar="N", help="sky: the number of directions; default: 145")
     study.add_argument("--definition", choices=("cosine", "geometric"), help="sky: what is weighed; default: cosine")
@@ -68,6 +84,7 @@ def add_study(commands: Any) -> None:
     study.add_argument("--distance", dest="max_distance", type=float, default=argparse.SUPPRESS, help=argparse.SUPPRESS)
     study.add_argument("--camera", type=Path, metavar="SCENE", help="for a .png: a scene file with the camera")
     study.add_argument("--resolution", type=resolution, metavar="WxH", help=_RESOLUTION)
+    add_view_factors(study)
     add_cluster(study)
     study.add_argument("--threads", type=int, metavar="N", help="default: all processors")
     study.add_argument("--quiet", action="store_true", help="show no progress, summary or notice")
@@ -94,6 +111,9 @@ def _study(options: argparse.Namespace) -> None:
     from renderer.octree import Octree
 
     _check_options(options)
+    if options.kind == _VIEW_FACTORS:
+        study_view_factors(options)
+        return
     options.mesh = mesh_paths(options.mesh)
     _check_output(options)
     paths = kept_of(options.mesh, options.hide)
@@ -174,10 +194,16 @@ def _check_options(options: argparse.Namespace) -> None:
     for kind, names in _OWN.items():
         for name in names:
             given = options.kind != kind and getattr(options, name) is not None
-            expect(not given, f"--{name}", f"none but for the kind {kind}", f"one for the kind {options.kind}")
+            _expect(not given, name, f"none but for the kind {kind}", f"one for the kind {options.kind}")
+    for name, usual in _OF_POINTS.items() if options.kind == _VIEW_FACTORS else ():
+        _expect(getattr(options, name) == usual, name, f"none for the kind {_VIEW_FACTORS}", "one")
     expect(options.kind != "sun" or options.suns is not None, "--suns", "a file for the kind sun", "none")
     for name in ("height", "bounds"):
-        expect(options.grid is not None or getattr(options, name) is None, f"--{name}", "none without --grid", "one")
+        _expect(options.grid is not None or getattr(options, name) is None, name, "none without --grid", "one")
+
+
+def _expect(condition: bool, option: str, expected: str, got: str) -> None:
+    expect(condition, f"--{option.replace('_', '-')}", expected, got)
 
 
 def _options_of(options: argparse.Namespace, up: str) -> dict[str, Any]:

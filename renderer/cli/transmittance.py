@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
 from typing import Any
@@ -18,10 +17,10 @@ _TRANSMITTANCE = (
 
 def add_transmittance(command: Any) -> None:
     """Add the option to a command."""
-    command.add_argument("--transmittance", action="append", default=[], metavar="NAME=VALUE", help=_TRANSMITTANCE)
+    command.add_argument("--transmittance", action="append", metavar="NAME=VALUE", help=_TRANSMITTANCE)
 
 
-def transmittance_of(files: Files, given: Sequence[str]) -> Any:
+def transmittance_of(files: Files, given: Sequence[str] | None) -> Any:
     """The share that each face lets through, (F,) float64, by the words of the option; None without any.
 
     Raises ``ValueError`` for words that are no name and share, and for a name that nothing has.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -34,6 +35,8 @@ class ViewFactors:
         The standard error of each entry of `matrix`; an entry that is exact has none.
     rays : ndarray of int64, shape (n,)
         The rays that left each surface.
+    names : tuple of str, optional
+        The name of each surface, which files have; None if they have none.
 
     See Also
     --------
@@ -55,6 +58,7 @@ class ViewFactors:
     backs: Floats
     errors: csr_array
     rays: NDArray[np.int64]
+    names: tuple[str, ...] | None = None
 
     @property
     def matrix(self) -> csr_array:
@@ -76,6 +80,81 @@ class ViewFactors:
         factors = self.exchange.copy()
         factors.data /= np.repeat(self.areas, np.diff(factors.indptr))
         return factors
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a file, which appears whole or not at all.
+
+        Parameters
+        ----------
+        path : str or path
+            ``.npz``: all of it, as `ViewFactors.load` reads it and ``numpy.load`` too: the arrays by their names,
+            without `names` if there are none, and of each matrix the three of ``scipy.sparse.csr_array``, such as
+            ``exchange_data``, ``exchange_indices`` and ``exchange_indptr``. Of `matrix` there is ``matrix_data``; the
+            other two are those of `exchange`.
+
+            ``.csv``: a row for each surface: its name, its area, a column with the view factor to each surface, the
+            sky, backs, and the largest standard error of the row.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written.
+        ValueError
+            If the name ends otherwise, or for a ``.csv`` of more than 16,380 surfaces, the columns that a spreadsheet
+            has.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from pathlib import Path
+        >>> from renderer import Octree
+        >>> from renderer.studies import view_factors
+        >>> factors = view_factors(Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     factors.save(f"{folder}/factors.csv")
+        ...     print(Path(folder, "factors.csv").read_text())
+        surface,area,0,sky,backs,error
+        0,0.5,0.0,1.0,0.0,0.0
+        """
+        from renderer.studies.factors.saved import save_factors  # which imports this module
+
+        save_factors(self, path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> ViewFactors:
+        """Read an ``.npz`` file that `save` wrote.
+
+        Parameters
+        ----------
+        path : str or path
+
+        Returns
+        -------
+        ViewFactors
+
+        Raises
+        ------
+        OSError
+            If the file cannot be read.
+        ValueError
+            If it is none of these files.
+        ImportError
+            If SciPy is not installed.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from renderer import Octree
+        >>> from renderer.studies import ViewFactors, view_factors
+        >>> factors = view_factors(Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     factors.save(f"{folder}/factors.npz")
+        ...     ViewFactors.load(f"{folder}/factors.npz").sky
+        array([1.])
+        """
+        from renderer.studies.factors.saved import load_factors
+
+        return load_factors(path)
 
 
 @dataclass(frozen=True, eq=False)
