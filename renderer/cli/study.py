@@ -5,17 +5,16 @@ View factors, the kind without points, are in ``renderer.cli.view_factors``.
 
 import argparse
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from renderer.cli.cluster import add_cluster, on_cluster
 from renderer.cli.meshes import Files, kept_of, load_files, say_up, up_of, values_of_files
 from renderer.cli.render import resolution
+from renderer.cli.study_files import FORMATS, KINDS, layout_of, write
 from renderer.cli.view_factors import add_view_factors, study_view_factors
 from renderer.errors import expect
 from renderer.system.terminal import say
 
-FORMATS = (".npy", ".ply", ".png")
-_KINDS = {"sky": "sky view factor", "sun": "hours of sun", "ao": "ambient occlusion"}
 _VIEW_FACTORS = "viewfactors"
 # Options that one kind alone has.
 _OWN = {
@@ -44,16 +43,6 @@ _DISTANCE = "how far from a point a hit still counts; default: any distance"
 _RESOLUTION = (
     "size of a .png with its legend; default: 960x720. Of a calibrated camera: without it; default: its film's"
 )
-# The size of a picture with its legend.
-_USUAL = 960, 720
-
-
-class Layout(NamedTuple):
-    """The camera of a picture, if one is given, its width and height in pixels, and the rows of the legend below."""
-
-    camera: Any
-    size: tuple[int, int]
-    legend_rows: int
 
 
 def add_study(commands: Any) -> None:
@@ -61,10 +50,10 @@ def add_study(commands: Any) -> None:
     study = commands.add_parser(
         "study",
         help="what points of a mesh see: the sky, the sun, their surroundings; and view factors",
-        description="Compute what points or surfaces of a mesh see. If a long run is killed, the same command goes on where it "
-        "stopped and ends with the same bits: parts that are done are kept beside the output.",
+        description="Compute what points or surfaces of a mesh see. If a long run is killed, the same command goes on "
+        "where it stopped and ends with the same bits: parts that are done are kept beside the output.",
     )
-    kinds = _KINDS | {_VIEW_FACTORS: "view factors between surfaces, and from them to the sky"}
+    kinds = KINDS | {_VIEW_FACTORS: "view factors between surfaces, and from them to the sky"}
     study.add_argument("kind", choices=kinds, help="; ".join(f"{k}: {said}" for k, said in kinds.items()))
     study.add_argument("mesh", type=Path, nargs="+", help=_MESH)
     study.add_argument("--up", choices=("x", "y", "z"), help=_UP)
@@ -119,7 +108,7 @@ def _study(options: argparse.Namespace) -> None:
     paths = kept_of(options.mesh, options.hide)
     up = _up(paths, options)
     made = _options_of(options, up)
-    layout = _layout(options)
+    layout = layout_of(options)
     files = load_files(paths)
     octree = Octree.from_mesh(files.mesh, threads=options.threads)
     chosen = _chosen(octree, options, up)
@@ -130,7 +119,7 @@ def _study(options: argparse.Namespace) -> None:
         if output.suffix.lower() == ".npy" and chosen.of_faces is None and chosen.of_vertices is None:
             parts.join(output)
         else:
-            _write(output, options, octree.mesh, chosen, parts.joined(), layout, up)
+            write(output, options, octree.mesh, chosen, parts.joined(), layout, up)
     if not options.quiet:
         _say_result(options, files, chosen, parts, seconds)
     # Last, so that no work is lost if a file cannot be written.
@@ -151,7 +140,7 @@ def _say_result(options: argparse.Namespace, files: Files, chosen: Any, parts: A
     outputs = ", ".join(map(str, options.output))
     blind = 0 if options.kind == "sun" else parts.count(0.0)
     nothing = f"; {blind:,} see nothing: they face down, are hidden all around or lie inside a body" if blind else ""
-    say(f"{outputs}: {_KINDS[options.kind]} of {parts.plan.rows:,} points in {seconds:.2f} s{nothing}")
+    say(f"{outputs}: {KINDS[options.kind]} of {parts.plan.rows:,} points in {seconds:.2f} s{nothing}")
     if len(files.paths) > 1:
         for line in values_of_files(files, chosen, parts.joined()):
             say(line)
@@ -219,23 +208,6 @@ def _options_of(options: argparse.Namespace, up: str) -> dict[str, Any]:
     return of | {name: value for name in _OWN[options.kind] if (value := getattr(options, name)) is not None}
 
 
-def _layout(options: argparse.Namespace) -> Layout:
-    """The layout of a picture. Refuses one that cannot be drawn before the work begins."""
-    from renderer.diagnostics.mesh_values import FINER, legend_rows, map_size
-    from renderer.scene.scene import MOST_PIXELS, load_scene
-
-    camera = None if options.camera is None else load_scene(options.camera).camera
-    film = None if camera is None else camera.film_size
-    width, height = options.resolution or film or _USUAL
-    widest = MOST_PIXELS // FINER
-    right = min(width, height) >= 1 and max(width, height) <= widest
-    expect(right, "--resolution", f"1x1 to {widest}x{widest}", f"{width}x{height}")
-    if camera is None or film is None:
-        return Layout(camera, map_size((width, height)), legend_rows(height))
-    camera.rays((0, 0), (width, height))  # refuses another shape than the film's
-    return Layout(camera, (width, height), legend_rows(height))
-
-
 def _chosen(octree: Any, options: argparse.Namespace, up: Any) -> Any:
     from renderer.studies import points as chosen
 
@@ -248,43 +220,3 @@ def _chosen(octree: Any, options: argparse.Namespace, up: Any) -> Any:
         return chosen.on_grid(octree, options.grid, bounds=bounds, height=options.height, up=up)
     except ValueError as error:
         raise ValueError(f"--{error}".replace("--spacing", "--grid", 1)) from None
-
-
-def _write(
-    output: Path, options: argparse.Namespace, mesh: Any, chosen: Any, answers: Any, layout: Layout, up: str
-) -> None:
-    """Write the results of points that need a place: those of a mesh, and those in a .ply."""
-    from renderer.arguments.up import UP_AXES
-    from renderer.diagnostics import mesh_values as drawing
-
-    suffix = output.suffix.lower()
-    if chosen.of_faces is None and chosen.of_vertices is None:
-        drawing.write_ply(output, chosen.points.points, None, answers, of_faces=False)
-        return
-    of_faces = chosen.of_faces is not None
-    values = chosen.of_faces(answers) if of_faces else chosen.of_vertices(answers)
-    if suffix == ".npy":
-        drawing.write_npy(output, values)
-    elif suffix == ".ply":
-        drawing.write_ply(output, mesh.vertices, mesh.faces, values, of_faces)
-    else:
-        seen = values if of_faces else values[mesh.faces].mean(axis=1)
-        image = _picture(mesh, layout, options, up)
-        picture = drawing.draw(image, mesh, seen, _KINDS[options.kind], layout.legend_rows, UP_AXES[up])
-        drawing.write_png(output, picture)
-
-
-def _picture(mesh: Any, layout: Layout, options: argparse.Namespace, up: str) -> Any:
-    """The faces and normals that a camera sees; by default it looks down from the south-west."""
-    from renderer.diagnostics.mesh_values import FINER
-    from renderer.materials.phong import Phong
-    from renderer.picture.render import render
-    from renderer.scene.overview import from_above
-    from renderer.scene.scene import Scene, SceneObject
-
-    thing = SceneObject(mesh=mesh, material="grey", normals="flat")
-    width, height = layout.size
-    eye = from_above(mesh, layout.size, up) if layout.camera is None else layout.camera
-    scene = Scene(camera=eye, materials={"grey": Phong()}, objects=[thing], ambient=1)
-    return render(scene, resolution=(FINER * width, FINER * height), samples=1, max_depth=0, planes=("face", "normal"),
-                  threads=options.threads, progress=not options.quiet)  # fmt: skip

@@ -70,7 +70,7 @@ class SentScene(NamedTuple):
 
 
 def kept(key: str, make: Callable[[], Any]) -> Any:
-    """What this process has under a key, or what ``make`` gives now; other threads wait, so it must not ask for more."""
+    """What this process has under a key, or makes now while other threads wait; ``make`` must not call this."""
     with _LOCK:
         if key not in _TREES:
             while len(_TREES) >= _MOST:
