@@ -134,7 +134,6 @@ def checked_tracing(
     progress: bool = False,
 ) -> Tracing:
     """The arguments of ``view_factors``, checked."""
-    scipy_sparse()
     searched = octree_of(octree)
     surfaces = check_surfaces(searched.mesh, groups, sides, transmittance)
     rtol, max_rays = check_effort(rtol, max_rays)
@@ -146,6 +145,7 @@ def checked_tracing(
 
 def computed(tracing: Tracing, work: Work) -> ViewFactors:
     """The view factors. Each step of ``work`` depends on the arguments and on the steps before alone."""
+    scipy_sparse()
     surfaces, pairs = tracing.surfaces, _known_pairs(tracing, work)
     left = surfaces.areas - pairs.sums(surfaces.number) > _WHOLE * surfaces.areas
     rows = np.flatnonzero(left)
