@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import sys
+import warnings
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -63,6 +65,7 @@ def study_view_factors(options: argparse.Namespace) -> None:
     seconds = time.perf_counter() - began
     for output in options.output:
         found.save(output)
+    _say_backs(found)
     if not options.quiet:
         outputs, rays = ", ".join(map(str, options.output)), int(found.rays.sum())
         worst = found.errors.data.max(initial=0.0)
@@ -77,12 +80,22 @@ def _run(octree: Any, folder: Any, groups: Any, made: dict[str, Any], options: a
     from renderer.checkpoints.view_factors import run_view_factors
 
     progress = not options.quiet
+    warnings.filterwarnings("ignore", ".*see backs of faces")  # said below, with the option
     if options.cluster is None:
         return run_view_factors(octree, folder, groups, progress=progress, **made)
     from renderer.cluster import view_factors_on
 
     with on_cluster(options) as client:
         return view_factors_on(client, octree, folder, groups, progress=progress, **made)
+
+
+def _say_backs(found: Any) -> None:
+    from renderer.studies.factors.assemble import backs_message
+    from renderer.studies.factors.saved import names_of
+
+    message = backs_message(found.backs, names_of(found), "use --sides both")
+    if message:
+        print(f"octree-render: {message}", file=sys.stderr)
 
 
 def _check_output(options: argparse.Namespace, surfaces: int) -> None:

@@ -13,6 +13,7 @@ from furnished import MATERIALS, OBJECTS, room_objects, same_bits, write_room
 from renderer import Mesh, Octree, load_mesh
 from renderer.cli import view_factors as command
 from renderer.cli.main import main
+from renderer.errors import extra_hint
 from renderer.mesh.load import save_ply
 from renderer.mesh.shapes import box
 from renderer.studies import ViewFactors, view_factors
@@ -226,7 +227,7 @@ def test_without_scipy_the_extra_is_named(
     monkeypatch.setitem(sys.modules, "scipy", None)
     assert study(tmp_path / "plain.ply", "-o", tmp_path / "f.npz") == 2
     error = capsys.readouterr().err
-    assert error == 'octree-render: view factors need SciPy: pip install "octree-renderer[radiosity]"\n'
+    assert error == f"octree-render: view factors need SciPy; {extra_hint('radiosity')}\n"
     assert [path.name for path in tmp_path.iterdir()] == ["plain.ply"]
 
 
@@ -261,6 +262,18 @@ def test_files_that_are_none_of_view_factors_are_refused(tmp_path: Path, spoil: 
         np.savez(path, **(arrays | {"errors_indptr": np.zeros(3, int)}))
     with pytest.raises(ValueError, match=r"f\.npz: expected view factors that ViewFactors\.save wrote"):
         ViewFactors.load(path)
+
+
+def test_backs_that_are_seen_are_named_with_the_option(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The ceiling faces down and the plate below it too: half of the ceiling's rays at most end on its back."""
+    (tmp_path / "p.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\no plate\nf 1 3 2\no ceiling\nf 4 6 5\n"
+    )
+    found = found_of(tmp_path / "f.npz", tmp_path / "p.obj", "--groups", "objects", *FEW)
+    said = f"1 of 2 surfaces see backs of faces, surface ceiling most: {100 * found.backs[1]:.3g} % of what it sends"
+    assert capsys.readouterr().err == f"octree-render: {said}; turn these faces, or use --sides both\n"
+    found_of(tmp_path / "f.npz", tmp_path / "p.obj", "--groups", "objects", "--sides", "both", *FEW)
+    assert capsys.readouterr().err == ""
 
 
 def test_names_and_bits_come_back_from_a_file(room: Path, tmp_path: Path) -> None:

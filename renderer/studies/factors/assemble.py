@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -82,11 +83,18 @@ def _symmetric(rows: Integers, columns: Integers, values: Floats, number: int) -
 
 def warn_of_backs(backs: Floats) -> None:
     """Warn the caller of the function that calls this one of rows that see backs."""
-    seen = np.flatnonzero(backs)
-    if len(seen):
-        worst = int(backs.argmax())
-        warnings.warn(
-            f"octree: {len(seen)} of {len(backs)} surfaces see backs of faces, surface {worst} most: "
-            f"{100.0 * backs[worst]:.3g} % of what it sends; turn these faces, or pass sides='both'",
-            stacklevel=3,
-        )
+    message = backs_message(backs, range(len(backs)), "pass sides='both'")
+    if message:
+        warnings.warn(f"octree: {message}", stacklevel=3)
+
+
+def backs_message(backs: Floats, names: Sequence[object], remedy: str) -> str:
+    """What is said of rows that see backs, by their names; empty if there are none."""
+    seen = np.count_nonzero(backs)
+    if not seen:
+        return ""
+    worst = int(backs.argmax())
+    return (
+        f"{seen} of {len(backs)} surfaces see backs of faces, surface {names[worst]} most: "
+        f"{100.0 * backs[worst]:.3g} % of what it sends; turn these faces, or {remedy}"
+    )
