@@ -60,7 +60,7 @@ ASKED: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "nothing": ((), {}),
     "--groups": (("--groups", "faces"), {}),
     "--sides": (("--sides", "both"), {"sides": "both"}),
-    "--rtol": (("--rtol", "0.1"), {"rtol": 0.1}),
+    "--rtol": (("--rtol", "0.9"), {"rtol": 0.9}),
     "--max-rays": (("--max-rays", "1024"), {"max_rays": 1024}),
     "--threads": (("--threads", "1"), {"threads": 1}),
 }
@@ -69,9 +69,9 @@ ASKED: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
 @cases("name", ASKED)
 def test_the_result_is_that_of_the_function_with_the_options_argument(room: Path, tmp_path: Path, name: str) -> None:
     words, given = ASKED[name]
-    octree, usual = Octree.from_mesh(load_mesh(room)), {"rtol": 0.5, "max_rays": 512}
+    octree, usual = Octree.from_mesh(load_mesh(room)), {"rtol": 0.1, "max_rays": 512}
     expected = view_factors(octree, **(usual | given))
-    found = found_of(tmp_path / "f.npz", room, "--rtol", 0.5, "--max-rays", 512, *words)
+    found = found_of(tmp_path / "f.npz", room, "--rtol", 0.1, "--max-rays", 512, *words)
     assert same_bits(found, expected) and found.names is None
     changes = name in ("--sides", "--rtol", "--max-rays")
     assert same_bits(found, view_factors(octree, **usual)) == (not changes)
@@ -80,9 +80,7 @@ def test_the_result_is_that_of_the_function_with_the_options_argument(room: Path
 def test_without_options_it_is_as_accurate_as_the_function(tmp_path: Path) -> None:
     save_ply(Mesh.concatenate([Mesh(*walls) for walls in list(room_objects().values())[4:]]), tmp_path / "some.ply")
     octree = Octree.from_mesh(load_mesh(tmp_path / "some.ply"))
-    with pytest.warns(UserWarning, match="see backs of faces"):
-        expected = view_factors(octree)
-    assert same_bits(found_of(tmp_path / "f.npz", tmp_path / "some.ply"), expected)
+    assert same_bits(found_of(tmp_path / "f.npz", tmp_path / "some.ply"), view_factors(octree))
 
 
 @cases("groups, names", [("objects", tuple(OBJECTS)), ("materials", tuple(MATERIALS))])
@@ -177,7 +175,7 @@ def test_it_says_what_it_wrote_unless_quiet(room: Path, tmp_path: Path, capsys: 
         (["-o", "{}/f.npy"], "--output: expected a file that ends in .npz or .csv, got '{}/f.npy'"),
         (["-o", "{}/f.NPZ.gz"], "--output: expected a file that ends in .npz or .csv, got '{}/f.NPZ.gz'"),
         (["-o", "{}/f.npz"], "--output: expected each file once, got {}/f.npz, {}/f.npz"),
-        (["-o", "{}/none/f.npz"], "{}/none/f.npz: No such file or directory"),
+        (["-o", "{}/none/f.npz"], "[Errno 2] No such file or directory: '{}/none/f.npz'"),
         (["--rtol", "0"], "rtol: expected a number above 0, got 0.0"),
         (["--max-rays", "9"], "max_rays: expected an integer from 256 to 16777216, got 9"),
         (["--transmittance", "tree=0.5"], "--transmittance: expected the name of a material, an object or a mesh file, "

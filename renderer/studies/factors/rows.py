@@ -134,12 +134,15 @@ def _tally(keys: Integers, rows: Integers, known: Known, rtol: float, last: bool
 
 def in_order(parts: list[tuple[Integers, RowHits]], rows: int) -> RowHits:
     """The hits of rows at their places, from records of some rows each."""
-    places = np.concatenate([part[0] for part in parts]) if parts else np.empty(0, np.int64)
+    if not parts:
+        nothing = np.empty(0, np.int64)
+        return RowHits(np.zeros(1, np.int64), nothing, nothing, np.empty(0), nothing)
+    places = np.concatenate([part[0] for part in parts])
     order = np.argsort(places, kind="stable")
-    begins = np.concatenate([part.first[:-1] for _, part in parts]) if parts else places
+    begins = np.concatenate([part.first[:-1] for _, part in parts])
     sizes = np.array([len(part.targets) for _, part in parts], np.int64)
     begins = begins + np.repeat(np.cumsum(sizes) - sizes, [len(own) for own, _ in parts])
-    lengths = np.concatenate([np.diff(part.first) for _, part in parts]) if parts else places
+    lengths = np.concatenate([np.diff(part.first) for _, part in parts])
     begins, lengths = begins[order], lengths[order]
     first = np.concatenate([[0], np.cumsum(lengths)])
     entries = np.arange(first[-1]) + np.repeat(begins - first[:-1], lengths)
