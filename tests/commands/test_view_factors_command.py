@@ -69,9 +69,9 @@ ASKED: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
 @cases("name", ASKED)
 def test_the_result_is_that_of_the_function_with_the_options_argument(room: Path, tmp_path: Path, name: str) -> None:
     words, given = ASKED[name]
-    octree, usual = Octree.from_mesh(load_mesh(room)), {"rtol": 0.1, "max_rays": 512}
+    octree, usual = Octree.from_mesh(load_mesh(room)), {"rtol": 0.02, "max_rays": 512}
     expected = view_factors(octree, **(usual | given))
-    found = found_of(tmp_path / "f.npz", room, "--rtol", 0.1, "--max-rays", 512, *words)
+    found = found_of(tmp_path / "f.npz", room, "--rtol", 0.02, "--max-rays", 512, *words)
     assert same_bits(found, expected) and found.names is None
     changes = name in ("--sides", "--rtol", "--max-rays")
     assert same_bits(found, view_factors(octree, **usual)) == (not changes)
