@@ -1,0 +1,1 @@
+"""View factors: the share of the light that leaves one surface and reaches another."""
