@@ -90,14 +90,15 @@ def nothing_known(rows: int) -> Known:
 
 def trace_rows(tracing: Tracing, rows: Integers, known: Known) -> RowHits:
     """Trace the rays of some rows; ``known`` has all rows."""
-    parts: list[tuple[Integers, RowHits]] = []
+    none = np.empty(0, np.int64)
+    parts = [(none, RowHits(np.zeros(1, np.int64), none, none, np.empty(0), none))]
     with progress_bar(len(rows), "surface", tracing.progress) as update:
 
         def trace(begin: int, end: int) -> Iterator[None]:
             yield from _trace_until(tracing, begin + np.arange(end - begin), rows, known, parts)
 
         for_chunks(trace, len(rows), _ROWS, tracing.threads, update)
-    return _in_order(parts, len(rows))
+    return _in_order(parts)
 
 
 def _trace_until(
@@ -132,14 +133,13 @@ def _tally(keys: Integers, rows: Integers, known: Known, rtol: float, last: bool
     return RowHits(ends, targets[used], counts[used], errors[used], np.full(len(ends) - 1, rays)), unfinished
 
 
-def _in_order(parts: list[tuple[Integers, RowHits]], rows: int) -> RowHits:
-    """The hits of rows at their places, from records of some rows each."""
-    places = np.concatenate([part[0] for part in parts]) if parts else np.empty(0, np.int64)
-    order = np.argsort(places, kind="stable")
-    begins = np.concatenate([part.first[:-1] for _, part in parts]) if parts else places
+def _in_order(parts: list[tuple[Integers, RowHits]]) -> RowHits:
+    """The hits of rows in the order of their places, from records of some rows each."""
+    order = np.argsort(np.concatenate([own for own, _ in parts]), kind="stable")
+    begins = np.concatenate([part.first[:-1] for _, part in parts])
     sizes = np.array([len(part.targets) for _, part in parts], np.int64)
     begins = begins + np.repeat(np.cumsum(sizes) - sizes, [len(own) for own, _ in parts])
-    lengths = np.concatenate([np.diff(part.first) for _, part in parts]) if parts else places
+    lengths = np.concatenate([np.diff(part.first) for _, part in parts])
     begins, lengths = begins[order], lengths[order]
     first = np.concatenate([[0], np.cumsum(lengths)])
     entries = np.arange(first[-1]) + np.repeat(begins - first[:-1], lengths)
