@@ -64,7 +64,7 @@ class KeptWork:
         size = rows_of_part(tracing.max_rays)
         parts = self._complete(name, tracing, len(rows), size, "surface", trace_part, arguments)
         places = [np.arange(begin, min(begin + size, len(rows))) for begin in range(0, len(rows), size)]
-        return in_order([(own, RowHits(*part)) for own, part in zip(places, parts, strict=True)], len(rows))
+        return in_order([(own, RowHits(*part)) for own, part in zip(places, parts, strict=True)])
 
     def pairs(self, tracing: Tracing, faces: Integers) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """As ``face_pairs``."""
