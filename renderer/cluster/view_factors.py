@@ -42,7 +42,7 @@ class SentTracing(NamedTuple):
 
         def make() -> Tracing:
             # Arrays that came over the wire cannot be written, which kernels would be compiled anew for.
-            surfaces = Surfaces(*map(np.array, self.surfaces))
+            surfaces = Surfaces._make(map(np.array, self.surfaces))
             return Tracing(octree._built, surfaces, senders_of(octree.mesh, surfaces), self.rtol, 0, 1, False)
 
         made: Tracing = kept(f"{self.digest} {self.mesh.split}", make)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import expect
-from renderer.studies.factors.result import ViewFactors, csr_array
+from renderer.studies.factors.result import ViewFactors
 from renderer.studies.factors.sparse import scipy_sparse
 from renderer.system.files import as_path, write_atomically
 
@@ -67,7 +67,7 @@ def names_of(factors: ViewFactors) -> tuple[str, ...]:
     return tuple(map(str, range(len(factors.areas)))) if factors.names is None else factors.names
 
 
-def _matrix(arrays: dict[str, NDArray[Any]], name: str, number: int) -> csr_array:
+def _matrix(arrays: dict[str, NDArray[Any]], name: str, number: int) -> Any:
     parts = tuple(arrays[f"{name}_{part}"] for part in ("data", "indices", "indptr"))
     matrix = scipy_sparse().csr_array(parts, shape=(number, number))
     # Else an index beyond the columns would be read from any memory.
