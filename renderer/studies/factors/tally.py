@@ -15,19 +15,20 @@ _HALF = 0.5
 def write_keys(faces, sides, of_face, both, number, begin, keys):
     """Write the keys of ``tally_rows`` for the rays from ``begin`` on of some rows.
 
-    faces, sides   (rows * n,) int64: what each ray hit, -1 for nothing, and from which side
+    faces, sides   (n * rows,) int64: what each ray hit, -1 for nothing, and from which side; the first ray of each row,
+                   then the second of each, and so on
     of_face, both  as of ``Surfaces``; ``number`` of them
     keys           (rows, n) int64
     """
     rows, count = keys.shape
-    for row in range(rows):
-        for k in range(count):
-            face = faces[row * count + k]
+    for k in range(count):
+        for row in range(rows):
+            face = faces[k * rows + row]
             # rule: sky-of-row
             target = number + SKY
             if face >= 0:
                 # rule: backs-of-faces
-                target = of_face[face] if sides[row * count + k] > 0 or both[face] else number + BACK
+                target = of_face[face] if sides[k * rows + row] > 0 or both[face] else number + BACK
             keys[row, k] = target * REPLICATES + (begin + k) % REPLICATES
 
 
