@@ -128,13 +128,22 @@ def _tally(keys: Integers, rows: Integers, known: Known, rtol: float, last: bool
     unfinished = np.empty(count, np.bool_)
     spans = [known.targets[known.first[row] : known.first[row + 1]] for row in rows]
     first = np.concatenate([[0], np.cumsum([len(span) for span in spans])])
-    tally_rows(
-        keys, first, np.concatenate(spans), known.largest[rows], rtol, targets, counts, errors, lengths, unfinished
-    )
-    unfinished &= not last
-    used = (np.arange(rays) < np.where(unfinished, 0, lengths)[:, None]).reshape(-1)
+    written = tally_rows(
+        keys,
+        first,
+        np.concatenate(spans),
+        known.largest[rows],
+        rtol,
+        last,
+        targets,
+        counts,
+        errors,
+        lengths,
+        unfinished,
+    )  # fmt: skip
     ends = np.concatenate([[0], np.cumsum(lengths[~unfinished])])
-    return RowHits(ends, targets[used], counts[used], errors[used], np.full(len(ends) - 1, rays)), unfinished
+    columns = (column[:written].copy() for column in (targets, counts, errors))
+    return RowHits(ends, *columns, np.full(len(ends) - 1, rays)), unfinished
 
 
 def _in_order(parts: list[tuple[Integers, RowHits]]) -> RowHits:
