@@ -20,7 +20,7 @@ from renderer.rayscene.scene import RayScene
 from renderer.studies.factors.assemble import warn_of_backs
 from renderer.studies.factors.compute import checked_tracing, computed
 from renderer.studies.factors.result import ViewFactors
-from renderer.studies.factors.rows import Known, RowHits, Tracing, Update, in_order, trace_rows
+from renderer.studies.factors.rows import Known, RowHits, Tracing, Update, in_order, order_of, trace_rows
 from renderer.studies.factors.work import face_pairs
 from renderer.system.files import check_writable
 from renderer.system.terminal import progress_bar
@@ -56,15 +56,19 @@ class KeptWork:
         self._files, self._compute = files, compute
 
     def rows(self, name: str, tracing: Tracing, rows: Integers, known: Known) -> RowHits:
-        """As ``trace_rows``."""
+        """As ``trace_rows``. The rows of a part lie together."""
+        order, size = order_of(tracing.senders, rows), rows_of_part(tracing.max_rays)
+
+        def places(here: slice) -> Integers:
+            return np.sort(order[here])
 
         def arguments(here: slice) -> tuple[Any, ...]:
-            return rows[here], *_of_rows(known, rows[here])
+            own = rows[places(here)]
+            return own, *_of_rows(known, own)
 
-        size = rows_of_part(tracing.max_rays)
         parts = self._complete(name, tracing, len(rows), size, "surface", trace_part, arguments)
-        places = [np.arange(begin, min(begin + size, len(rows))) for begin in range(0, len(rows), size)]
-        return in_order([(own, RowHits(*part)) for own, part in zip(places, parts, strict=True)])
+        owned = [places(slice(begin, begin + size)) for begin in range(0, len(rows), size)]
+        return in_order([(own, RowHits(*part)) for own, part in zip(owned, parts, strict=True)])
 
     def pairs(self, tracing: Tracing, faces: Integers) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """As ``face_pairs``."""
