@@ -130,8 +130,8 @@ def occlusion(
     Returns
     -------
     ndarray of float64, shape (...)
-        The weights of the hidden directions over all weights: exactly 0 if all is open, exactly 1 if all is hidden. With
-        `transmittance` a direction counts by the share of its ray that is lost.
+        The weights of the hidden directions over all weights: exactly 0 if all is open, exactly 1 if all is hidden.
+        With `transmittance` a direction counts by the share of its ray that is lost.
     ndarray of uint8, shape (..., ceil(k / 8))
         If `packed`: a set bit for each hidden direction, in the order of ``numpy.unpackbits(..., axis=-1, count=k)``.
 

@@ -114,7 +114,8 @@ def sky_view_factor(
     """
     _expect_definition(definition)
     pole = pole_of(up)
-    request = check_request(octree, points, pole if normals is None else normals, leaving, threads, progress, transmittance)
+    normals = pole if normals is None else normals
+    request = check_request(octree, points, normals, leaving, threads, progress, transmittance)
     pattern = _patches(patches)
     directions = turned(pattern.directions, pole)
     # rule: cosine-of-patches
@@ -151,7 +152,8 @@ def sun_hours(
     normals : array_like, shape (..., 3) or (3,), or None
         As for `occlusion`.
     sun_directions : array_like, shape (k, 3)
-        From the points to the sun, in the coordinates of the mesh, one for each step of time.
+        From the points to the sun, in the coordinates of the mesh, one for each step of time, such as those of
+        `sun_directions` from azimuth and elevation.
     weights : array_like, shape (k,), optional
         The hours of each step, >= 0. By default 1 each.
     up : {"x", "y", "z"} or array_like, shape (3,), optional
