@@ -49,7 +49,7 @@ def _named(paths: Sequence[Path], pattern: str, option: str) -> list[Path]:
 
 
 def transmittance_of(files: Files, given: Sequence[str]) -> Any:
-    """The transmittance (F,) of all faces: by each file's name, or from an array in an ``.npy`` file. Later words win."""
+    """The transmittance (F,) of all faces: by the names of files, or from an array in an ``.npy`` file; the last wins."""
     import numpy as np
 
     from renderer.studies.points import read_array
@@ -57,14 +57,14 @@ def transmittance_of(files: Files, given: Sequence[str]) -> Any:
 
     option, shares = "--transmittance", np.zeros(len(files.mesh.faces))
     for word in given:
-        pattern, equals, value = word.rpartition("=")
-        if not equals:
-            expect(word.lower().endswith(".npy"), option, "NAME=VALUE or an .npy file", repr(word))
+        if is_array(word):
             shares = check_transmittance(option, read_array(option, Path(word)), len(shares))
             continue
+        pattern, _, value = word.rpartition("=")
+        share = _share(value, word, option)
         for path in _named(files.paths, pattern, option):
             place = files.paths.index(path)
-            shares[files.faces[place] : files.faces[place + 1]] = _share(value, word, option)
+            shares[files.faces[place] : files.faces[place + 1]] = share
     return shares
 
 
@@ -73,8 +73,13 @@ def _share(value: str, word: str, option: str) -> float:
         share = float(value)
     except ValueError:
         share = -1.0
-    expect(0.0 <= share <= 1.0, option, "NAME=VALUE, a number from 0 to 1", repr(word))
+    expect(0.0 <= share <= 1.0, option, "NAME=VALUE with a number from 0 to 1, or an .npy file", repr(word))
     return share
+
+
+def is_array(word: str) -> bool:
+    """Whether a word of ``--transmittance`` names a file."""
+    return word.lower().endswith(".npy")
 
 
 def load_files(paths: list[Path]) -> Files:

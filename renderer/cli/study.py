@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from renderer.cli.cluster import add_cluster, on_cluster
-from renderer.cli.meshes import Files, kept_of, load_files, say_up, transmittance_of, up_of, values_of_files
+from renderer.cli.meshes import Files, is_array, kept_of, load_files, say_up, transmittance_of, up_of, values_of_files
 from renderer.cli.render import resolution
 from renderer.errors import expect
 from renderer.system.terminal import say
@@ -19,12 +19,12 @@ _MESH = (
     "values of each"
 )
 _UP = (
-    "the axis that points up; default: y for glTF, else z. kind sun: with it, or with a table of angles, suns below the "
+    "the axis that points up; default: y for glTF, else z. kind sun: with it, or with angles in --suns, suns below the "
     "horizon do not count"
 )
 _SUNS = (
-    "sun: a text of rows x y z hours, to the sun; or a table with a line of names: azimuth (clockwise from north, which "
-    "is +y, or -z where y is up) and elevation, in degrees, and hours; also pvlib's columns"
+    "sun: a text of rows x y z hours, to the sun; or a table whose first line has the names azimuth, elevation and, if "
+    "given, hours: degrees, clockwise from north, which is +y, or -z where y is up; pvlib's tables are read as they are"
 )
 _TRANSMITTANCE = (
     "the share of light that faces let through: of the mesh files of a name or pattern, such as 'tree*.obj=0.3'; or an "
@@ -168,7 +168,7 @@ def _check_output(options: argparse.Namespace) -> None:
     from renderer.system.files import are_apart, check_writable
 
     on_mesh = options.grid is None and options.points is None
-    arrays = (Path(word) for word in options.transmittance if "=" not in word)
+    arrays = (Path(word) for word in options.transmittance if is_array(word))
     given = (*options.mesh, options.points, options.suns, options.camera, *arrays)
     read = [file for file in given if file is not None]
     for output in options.output:
