@@ -49,7 +49,7 @@ def _named(paths: Sequence[Path], pattern: str, option: str) -> list[Path]:
 
 
 def transmittance_of(files: Files, given: Sequence[str]) -> Any:
-    """The transmittance (F,) of all faces: by the names of files, or from an array in an ``.npy`` file; the last wins."""
+    """The transmittance (F,) of all faces: by names of files, or from an array in an ``.npy`` file; the last wins."""
     import numpy as np
 
     from renderer.studies.points import read_array
