@@ -73,7 +73,6 @@ def divided(octree: Queries, transmittance: ArrayLike) -> Division:
 
 
 def _divide(octree: Queries, built: Built, shares: Floats) -> Division:
-    # rule: clear-faces
     opaque, panes = shares == 0.0, (shares > 0.0) & (shares < 1.0)
     return Division(
         built,
