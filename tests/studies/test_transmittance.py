@@ -61,7 +61,7 @@ def mixed(count: int, seed: int = 3) -> Any:
     return np.random.default_rng(seed).choice([0.0, 0.3, 0.6, 1.0], count)
 
 
-@cases("study", STUDIES)
+@pytest.mark.parametrize("study", STUDIES)
 class TestLaws:
     def test_faces_that_let_nothing_through_have_the_bits_of_no_argument(self, study: str) -> None:
         mesh, (points, normals, faces) = court()
