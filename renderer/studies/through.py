@@ -30,7 +30,7 @@ from renderer.studies.sweep import (
     sweep_pointers,
 )
 from renderer.trace.rays import RayPointers
-from renderer.trace.starts.record import EDGE, ROW, SLACK, StartPointers
+from renderer.trace.starts.record import BARYCENTRIC, CODE, EDGE, FACE, ROW, SLACK, StartPointers
 from renderer.trace.traverse import Scratch, new_scratch, scratch_pointers
 from renderer.trace.trees import tree_pointers
 
@@ -124,9 +124,7 @@ def _aim_through(places, sky, scratch, bits, rows, begin, k, count, listed, rays
         d, height, value = look(places, sky, scratch, i, given, weight)
         seen = height > 0.0 and bits[rows[begin + i], k >> 3] & np.uint8(0x80 >> (k & 7)) == 0
         if seen:
-            # A face that stops the ray at once takes its share: the search from the exact start lists it.
-            if not start_ray(scratch, i, d, rays):
-                store(scratch.starts, ROW * rays + SLACK, EDGE)
+            _start_through(scratch, i, d, rays)
             put3(scratch.directions, 3 * rays, d)
             store(scratch.limits, rays, limit)
         store(scratch.values, listed, value)
@@ -134,6 +132,20 @@ def _aim_through(places, sky, scratch, bits, rows, begin, k, count, listed, rays
         listed += 1
         rays += np.int64(seen)
     return listed, rays
+
+
+@kernel
+def _start_through(scratch, i, d, ray):
+    """``start_ray`` for a ray that a face at its start does not stop, but takes its share of."""
+    is_free, row = start_ray(scratch, i, d, ray), offset(scratch.starts, ROW * ray)
+    if load(row, FACE) < 0.0:
+        return
+    if not is_free:
+        # The search from the exact start lists the face.
+        store(row, SLACK, EDGE)
+    elif load(row, SLACK) != EDGE:
+        # Within its face nothing is left to be decided at the start.
+        store(row, CODE, np.float64(np.int64(load(row, CODE)) & BARYCENTRIC))
 
 
 @kernel
