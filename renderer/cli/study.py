@@ -195,7 +195,7 @@ def _check_options(options: argparse.Namespace) -> None:
         expect(options.grid is not None or getattr(options, name) is None, f"--{name}", "none without --grid", "one")
 
 
-def _options_of(options: argparse.Namespace, up: str) -> dict[str, Any]:
+def _options_of(options: argparse.Namespace, up: Any) -> dict[str, Any]:
     """The keyword arguments of the study, but for those that need the mesh."""
     from renderer.studies.sun_files import suns_of
 
