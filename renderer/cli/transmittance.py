@@ -1,42 +1,56 @@
-"""``--transmittance``: the share of each ray that the faces of a material, an object or a file let through."""
+"""``--transmittance``: how much light the faces of a material, an object or a file let through."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
+from pathlib import Path
 from typing import Any
 
 from renderer.cli.meshes import Files
 from renderer.errors import expect
 
+_OPTION = "--transmittance"
 _TRANSMITTANCE = (
-    "the share of each ray, from 0 to 1, that faces let through: those of the material, object or mesh file of this "
-    "name or pattern, such as 'tree*=0.3'; may be given again, and the last one holds"
+    "the share of light, from 0 to 1, that faces let through: those of the material, object or mesh file of a name or "
+    "pattern, such as 'tree*.obj=0.3'; or an .npy file with a value for each face; may be given again, and the last "
+    "holds"
 )
 
 
 def add_transmittance(command: Any) -> None:
     """Add the option to a command."""
-    command.add_argument("--transmittance", action="append", metavar="NAME=VALUE", help=_TRANSMITTANCE)
+    command.add_argument(_OPTION, action="append", default=[], metavar="NAME=VALUE", help=_TRANSMITTANCE)
 
 
-def transmittance_of(files: Files, given: Sequence[str] | None) -> Any:
-    """The share that each face lets through, (F,) float64, by the words of the option; None without any.
+def transmittance_of(files: Files, given: Sequence[str]) -> Any:
+    """The transmittance of all faces, (F,) float64, by the words of the option; None without any.
 
     Raises ``ValueError`` for words that are no name and share, and for a name that nothing has.
     """
     import numpy as np
 
+    from renderer.studies.points import read_array
+    from renderer.studies.translucent import check_transmittance
+
     if not given:
         return None
     shares, named = np.zeros(len(files.mesh.faces)), list(_named(files))
     for word in given:
+        if is_array(word):
+            shares = check_transmittance(_OPTION, read_array(_OPTION, Path(word)), len(shares))
+            continue
         pattern, share = _pair(word)
-        faces = [faces for name, faces in named if name == pattern or fnmatchcase(name, pattern)]
-        expect(bool(faces), "--transmittance", "the name of a material, an object or a mesh file", repr(pattern))
+        faces = [faces for names, faces in named if any(n == pattern or fnmatchcase(n, pattern) for n in names)]
+        expect(bool(faces), _OPTION, "the name of a material, an object or a mesh file, or a pattern", repr(pattern))
         for some in faces:
             shares[some] = share
     return shares
+
+
+def is_array(word: str) -> bool:
+    """Whether a word of the option names a file of values."""
+    return word.lower().endswith(".npy")
 
 
 def _pair(word: str) -> tuple[str, float]:
@@ -46,16 +60,17 @@ def _pair(word: str) -> tuple[str, float]:
         share = float(value)
     except ValueError:
         share = -1.0
-    expect(bool(name) and 0.0 <= share <= 1.0, "--transmittance", "NAME=VALUE with a value from 0 to 1", repr(word))
+    good = bool(name) and 0.0 <= share <= 1.0
+    expect(good, _OPTION, "NAME=VALUE with a number from 0 to 1, or an .npy file", repr(word))
     return name, share
 
 
-def _named(files: Files) -> Iterator[tuple[str, Any]]:
-    """What may be named, and its faces: materials, objects and files."""
+def _named(files: Files) -> Iterator[tuple[list[str], Any]]:
+    """The names of each material, object and file, and its faces."""
     mesh = files.mesh
     for row, material in enumerate(mesh.materials):
-        yield material.name, mesh.face_materials == row
+        yield [material.name], mesh.face_materials == row
     for part in mesh.parts:
-        yield part.name, part.faces
+        yield [part.name], part.faces
     for number, path in enumerate(files.paths):
-        yield path.name, slice(files.faces[number], files.faces[number + 1])
+        yield [path.name, str(path)], slice(files.faces[number], files.faces[number + 1])

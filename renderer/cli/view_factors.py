@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from renderer.cli.cluster import on_cluster
 from renderer.cli.meshes import Files, kept_of, load_files
-from renderer.cli.transmittance import add_transmittance, transmittance_of
+from renderer.cli.transmittance import is_array, transmittance_of
 from renderer.errors import expect
 from renderer.system.terminal import say
 
@@ -38,7 +38,6 @@ def add_view_factors(study: argparse.ArgumentParser) -> None:
     own.add_argument("--sides", choices=("front", "both"), help=_SIDES)
     own.add_argument("--rtol", type=float, metavar="R", help=_RTOL)
     own.add_argument("--max-rays", type=int, metavar="N", help="most rays of a surface; default: 65536")
-    add_transmittance(own)
 
 
 def study_view_factors(options: argparse.Namespace) -> None:
@@ -103,9 +102,10 @@ def _check_output(options: argparse.Namespace, surfaces: int) -> None:
     from renderer.studies.factors.saved import check_factors_path
     from renderer.system.files import are_apart, check_writable
 
+    read = (*options.mesh, *(word for word in options.transmittance if is_array(word)))
     for output in options.output:
         check_factors_path("--output", output, surfaces)
-        expect(are_apart([output], options.mesh), "--output", "a file that is not an input", str(output))
+        expect(are_apart([output], read), "--output", "a file that is not an input", str(output))
     expect(are_apart(options.output), "--output", "each file once", ", ".join(map(str, options.output)))
     for output in options.output:
         check_writable(output)

@@ -69,6 +69,16 @@ class SentScene(NamedTuple):
         return prepared
 
 
+class SentStudy(NamedTuple):
+    """A study as it travels, once for all its parts: the digest of its mesh, the mesh, and itself with its options,
+    some of which have a number for each face.
+    """
+
+    digest: str
+    mesh: SentMesh
+    study: Any
+
+
 def kept(key: str, make: Callable[[], Any]) -> Any:
     """What this process has under a key, or makes now while other threads wait; ``make`` must not call this."""
     with _LOCK:
@@ -79,9 +89,9 @@ def kept(key: str, make: Callable[[], Any]) -> Any:
         return _TREES[key]
 
 
-def evaluate_part(mesh: SentMesh, study: Any, points: Any) -> NDArray[np.float64]:
+def evaluate_part(sent: SentStudy, points: Any) -> NDArray[np.float64]:
     """The answers to a study's part; a task."""
-    answers: NDArray[np.float64] = study.evaluate(mesh.octree(), points, threads=1)
+    answers: NDArray[np.float64] = sent.study.evaluate(sent.mesh.octree(), points, threads=1)
     return answers
 
 

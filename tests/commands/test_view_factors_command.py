@@ -22,11 +22,12 @@ from renderer.studies.factors import saved
 pytest.importorskip("scipy")
 pytestmark = pytest.mark.judges(
     "octree-render study --groups", "octree-render study --max-rays", "octree-render study --rtol",
-    "octree-render study --sides", "octree-render study --transmittance", "octree-render study kind",
+    "octree-render study --sides", "octree-render study kind",
     "studies.ViewFactors.load", "studies.ViewFactors.save",
 )  # fmt: skip
 # Of a unit cube: a wall to the one opposite (Howell C-11) and to one beside it (C-14).
 OPPOSITE, BESIDE = 0.19982489569838746, 0.20004377607540316
+PAIR = "--transmittance: expected NAME=VALUE with a number from 0 to 1, or an .npy file"
 # Few rays, as of which nothing is said here.
 FEW = ("--rtol", "0.5", "--max-rays", "256")
 
@@ -133,6 +134,9 @@ def test_what_is_let_through_is_named(room: Path, tmp_path: Path, words: list[st
     octree = Octree.from_mesh(load_mesh(room))
     expected = view_factors(octree, sides="both", transmittance=shares, rtol=0.5, max_rays=256)
     assert same_bits(found, expected)
+    np.save(tmp_path / "shares.npy", shares)
+    words = ["--transmittance", str(tmp_path / "shares.npy"), "--sides", "both", *FEW]
+    assert same_bits(found_of(tmp_path / "f.npz", room, *words), expected)
 
 
 def test_a_table_has_a_row_for_each_surface(room: Path, tmp_path: Path) -> None:
@@ -179,13 +183,10 @@ def test_it_says_what_it_wrote_unless_quiet(room: Path, tmp_path: Path, capsys: 
         (["--rtol", "0"], "rtol: expected a number above 0, got 0.0"),
         (["--max-rays", "9"], "max_rays: expected an integer from 256 to 16777216, got 9"),
         (["--transmittance", "tree=0.5"], "--transmittance: expected the name of a material, an object or a mesh file, "
-         "got 'tree'"),
-        (["--transmittance", "plain=1.5"], "--transmittance: expected NAME=VALUE with a value from 0 to 1, got "
-         "'plain=1.5'"),
-        (["--transmittance", "plain"], "--transmittance: expected NAME=VALUE with a value from 0 to 1, got 'plain'"),
-        (["--transmittance", "=0.5"], "--transmittance: expected NAME=VALUE with a value from 0 to 1, got '=0.5'"),
-        (["--transmittance", "plain=nan"], "--transmittance: expected NAME=VALUE with a value from 0 to 1, got "
-         "'plain=nan'"),
+         "or a pattern, got 'tree'"),
+        *((["--transmittance", word], f"{PAIR}, got '{word}'") for word in ("plain=1.5", "plain", "=0.5", "plain=nan")),
+        (["--transmittance", "{}/none.npy"], "--transmittance: expected a file that can be read, got {}/none.npy: No "
+         "such file or directory"),
         (["--patches", "9"], "--patches: expected none but for the kind sky, got one for the kind viewfactors"),
         (["--grid", "9"], "--grid: expected none for the kind viewfactors, got one"),
         (["--vertices"], "--vertices: expected none for the kind viewfactors, got one"),

@@ -76,7 +76,8 @@ import warnings
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import icosphere
 from renderer.queryable import Queries
-from renderer.studies import ambient_occlusion, occlusion, scan, sky_view_factor, view_factors, view_factors_from, visible_faces
+from renderer.studies import ambient_occlusion, occlusion, scan, sky_view_factor, visible_faces
+from renderer.studies import view_factors, view_factors_from
 ball, rng = icosphere(3), np.random.default_rng(1)
 # In float64 and in float32, of which the kernels of trees have two kinds.
 meshes = [ball, Mesh(ball.vertices.astype(np.float32), ball.faces), Mesh(ball.vertices * 1e-60, ball.faces)]
