@@ -35,13 +35,13 @@ def transmittance_of(files: Files, given: Sequence[str]) -> Any:
 
     if not given:
         return None
-    shares, named = np.zeros(len(files.mesh.faces)), list(_named(files))
+    shares = np.zeros(len(files.mesh.faces))
     for word in given:
         if is_array(word):
             shares = check_transmittance(_OPTION, read_array(_OPTION, Path(word)), len(shares))
             continue
         pattern, share = _pair(word)
-        faces = [faces for names, faces in named if any(n == pattern or fnmatchcase(n, pattern) for n in names)]
+        faces = list(_faces_of(files, pattern))
         expect(bool(faces), _OPTION, "the name of a material, an object or a mesh file, or a pattern", repr(pattern))
         for some in faces:
             shares[some] = share
@@ -65,12 +65,14 @@ def _pair(word: str) -> tuple[str, float]:
     return name, share
 
 
-def _named(files: Files) -> Iterator[tuple[list[str], Any]]:
-    """The names of each material, object and file, and its faces."""
+def _faces_of(files: Files, pattern: str) -> Iterator[Any]:
+    """The faces of each material, object and file of a name or pattern, or of a file at a path."""
     mesh = files.mesh
-    for row, material in enumerate(mesh.materials):
-        yield [material.name], mesh.face_materials == row
-    for part in mesh.parts:
-        yield [part.name], part.faces
+    named = [(material.name, mesh.face_materials == row) for row, material in enumerate(mesh.materials)]
+    named += [(part.name, part.faces) for part in mesh.parts]
     for number, path in enumerate(files.paths):
-        yield [path.name, str(path)], slice(files.faces[number], files.faces[number + 1])
+        name = pattern if path == Path(pattern) else path.name
+        named.append((name, slice(files.faces[number], files.faces[number + 1])))
+    for name, faces in named:
+        if name == pattern or fnmatchcase(name, pattern):
+            yield faces
