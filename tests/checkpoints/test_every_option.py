@@ -18,7 +18,7 @@ from renderer import Octree, load_mesh
 from renderer.checkpoints.study import KINDS
 from renderer.cli.main import main, make_parser
 from renderer.mesh.load import save_ply
-from renderer.studies import face_points
+from renderer.studies import face_points, sun_directions
 
 CAMERA = {"eye": [3.0, -4.0, 5.0], "target": [0.0, 0.0, 0.5], "up": [0.0, 0.0, 1.0], "fov": 50.0}
 FACES = len(scenery().faces)
@@ -36,7 +36,7 @@ FUNCTIONS: dict[str, tuple[str, list[str], dict[str, Any]]] = {
     "--suns of angles": (
         "sun",
         ["--suns", "{}/angles.csv"],
-        {"sun_directions": [[1, 0, 1], [0, -1, 1]], "weights": [2, 1], "up": "z"},
+        {"sun_directions": sun_directions([90, 180, 0], [45, 45, -30]), "weights": [2, 1, 4], "up": "z"},
     ),
     "--samples": ("ao", ["--samples", "64"], {"samples": 64}),
     "--transmittance": ("sky", ["--transmittance", "mesh.ply=0.25"], {"transmittance": np.full(FACES, 0.25)}),
