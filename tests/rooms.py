@@ -62,12 +62,13 @@ def points_on(triangles, rng):
 
 
 def seen_shares(octree, triangles, pairs, rays, rng):
-    """For each pair, how many of its rays run before both faces, and how many of these hit nothing."""
+    """For each pair, how many of its rays run before both faces, not edge-on, and how many of these hit nothing."""
     first, second = (np.repeat(pairs[:, k], rays) for k in range(2))
     p, q = points_on(triangles[first], rng), points_on(triangles[second], rng)
     normals = normals_of(triangles)
-    before = ((q - p) * normals[first]).sum(axis=1) > 1e-9
-    before &= ((p - q) * normals[second]).sum(axis=1) > 1e-9
+    edge_on = 1e-6 * np.abs(triangles).max()
+    before = ((q - p) * normals[first]).sum(axis=1) > edge_on
+    before &= ((p - q) * normals[second]).sum(axis=1) > edge_on
     open_ = before.copy()
     rows = np.flatnonzero(before)
     open_[rows] = octree.visible(p[rows], q[rows], first[rows], second[rows])

@@ -33,6 +33,9 @@ _PARALLEL = 2.0**-92
 # The largest sum of the radii of polygons, as a share of their distance, for the rules of degree 5 and 8. Their errors
 # are about these shares to the 6th and 9th power: 1e-12.
 _FAR, _APART = 0.01, 0.045
+# Errors over areas as a share of the result; over contours, where terms cancel, as a share of the radii's product. Twice
+# the largest that tests find.
+_AREA_ERROR, _CONTOUR_ERROR = 1e-11, 1e-14
 
 
 def _gauss(count: int) -> list[float]:
@@ -69,6 +72,13 @@ RULES = locked(np.array(_gauss(_NODES) + _SEVEN + _SIXTEEN))
 _AT_SEVEN, _AT_SIXTEEN = 2 * _NODES, 2 * _NODES + 4 * 7
 
 
+class Exchange(NamedTuple):
+    """An exchange area and a bound of its rounding errors."""
+
+    area: float
+    error: float
+
+
 class _Singular(NamedTuple):
     """A complex place t on an edge at which an integrand is not analytic."""
 
@@ -86,33 +96,35 @@ class _Edge(NamedTuple):
 
 @kernel
 def exchange_between(first, second, rules):
-    """``exchange_area`` of polygons (n, 3) and (m, 3), for Python."""
-    return exchange_area(pointer(first), len(first), pointer(second), len(second), pointer(rules))
+    """``exchange_of`` polygons (n, 3) and (m, 3), for Python: the area alone."""
+    return exchange_of(pointer(first), len(first), pointer(second), len(second), pointer(rules)).area
 
 
 @kernel
-def exchange_area(first, n, second, m, rules):
-    """A_i F_ij of two convex polygons, in the unit of their corners squared.
+def exchange_of(first, n, second, m, rules):
+    """The ``Exchange`` A_i F_ij of two convex polygons, in the unit of their corners squared.
 
     first, second  ``pointer`` to n and m corners, counter-clockwise seen from the side that sends
     rules          ``pointer`` to RULES
 
-    It is negative if just one of the two shows the other its back. The absolute error is about 1e-15 of the product of
-    the longest sides where polygons are near.
+    It is negative if just one of the two shows the other its back.
     """
     a, b = _centre(first, n), _centre(second, m)
     radius_a, radius_b = _radius(first, n, a), _radius(second, m, b)
     way = sub(b, a)
     distance = math.sqrt(dot(way, way))
     if radius_a + radius_b <= _FAR * distance:
-        return _over_areas(first, n, second, m, offset(rules, _AT_SEVEN), 7)
+        area = _over_areas(first, n, second, m, offset(rules, _AT_SEVEN), 7)
+        return Exchange(area, fabs(area) * _AREA_ERROR)
     if radius_a + radius_b <= _APART * distance:
-        return _over_areas(first, n, second, m, offset(rules, _AT_SIXTEEN), 16)
+        area = _over_areas(first, n, second, m, offset(rules, _AT_SIXTEEN), 16)
+        return Exchange(area, fabs(area) * _AREA_ERROR)
     # Distances are measured in this unit, so that logarithms are near 0 and little cancels.
     unit = maximum(distance, maximum(radius_a, radius_b))
+    per_square, error = 1.0 / (unit * unit), radius_a * radius_b * _CONTOUR_ERROR
     if radius_a <= radius_b:
-        return _over_contours(first, n, second, m, 1.0 / (unit * unit), rules)
-    return _over_contours(second, m, first, n, 1.0 / (unit * unit), rules)
+        return Exchange(_over_contours(first, n, second, m, per_square, rules), error)
+    return Exchange(_over_contours(second, m, first, n, per_square, rules), error)
 
 
 @kernel

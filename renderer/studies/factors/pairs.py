@@ -13,7 +13,7 @@ from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import load, local_doubles, maximum, minimum, offset, pointer
 from renderer.numerics.vec3 import add, cross, dot, largest_component, put3, row3, scale, sub
 from renderer.queryable import Queries
-from renderer.studies.factors.contour import RULES, exchange_area
+from renderer.studies.factors.contour import RULES, exchange_of
 from renderer.studies.factors.shaft import MOST_PLANES, PLANE, ROUNDING, Shaft, is_clear, with_planes
 from renderer.system.threads import for_chunks
 from renderer.trace.closest import rays_against_blocks
@@ -28,6 +28,10 @@ _CORNERS, _CUT, _NORMALS, _PLANES = 0, 24, 48, 54
 assert _PLANES + PLANE * MOST_PLANES <= 500
 # A triangle that is narrower than so many roundings of its coordinates has no plane.
 _NO_PLANE = 2.0**10
+# No corner is taken to be in a plane that is farther off than so, as a share of the size of both triangles.
+_IN_PLANE = 2.0**-24
+# An exchange is known to this share of itself at least: needles and what is seen edge-on lose digits.
+_RELATIVE = 1e-7
 # The sides of a plane on which a triangle's corners are: behind or in it, before or in it, in it, on both.
 _BEHIND, _BEFORE, _IN, _ACROSS = range(4)
 
@@ -78,7 +82,7 @@ def exact_pairs(
     Notes
     -----
     The proof moves vertices by some roundings of their largest coordinate, see ``shaft``. A known exchange has a
-    relative error of 1e-10 at most, unless a face is a needle or seen edge-on.
+    relative error of 1e-11 at most; up to 1e-7 where a face is a needle or seen edge-on.
 
     Examples
     --------
@@ -157,8 +161,9 @@ def _exchange(tree, stack, memory, pair, rules):
         return none
     if minimum(width_a, width_b) < _NO_PLANE * ROUNDING * largest:
         return unknown
-    plane_a = _plane(memory, ROUNDING * largest * (1.0 + size / width_a))
-    plane_b = _plane(offset(memory, 9), ROUNDING * largest * (1.0 + size / width_b))
+    error, most = ROUNDING * largest, _IN_PLANE * size
+    plane_a = _plane(memory, minimum(error * (1.0 + size / width_a), most))
+    plane_b = _plane(offset(memory, 9), minimum(error * (1.0 + size / width_b), most))
     side_a, side_b = _side(plane_b, memory), _side(plane_a, offset(memory, 9))
     if side_a == _IN or side_b == _IN:
         # Faces that lie on each other may see each other whole or not at all.
@@ -184,8 +189,9 @@ def _exchange(tree, stack, memory, pair, rules):
     )  # fmt: skip
     if not is_clear(tree, stack, shaft):
         return unknown
-    exchange = exchange_area(corners, n, offset(corners, 3 * n), m, rules)
-    return _Known(abs(exchange) if pair.both else maximum(exchange, 0.0), True)
+    found = exchange_of(corners, n, offset(corners, 3 * n), m, rules)
+    area = abs(found.area) if pair.both else found.area
+    return _Known(area, True) if found.error <= _RELATIVE * area else unknown
 
 
 @kernel

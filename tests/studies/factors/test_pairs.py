@@ -74,7 +74,7 @@ def furnished(seed):
     shell = box((0, 0, 0), (4, 3, 2.5), 3, True)
     table = box((1, 1, 0), (2, 1.5, 0.75), 1, False)[1:]
     lamp = box((2.5, 1, 1.5), (2.75, 1.25, 1.75), 1, False)
-    screen = [panel((3, 0, 0), (0, 1.5, 0), (0, 0, 1.5), 1), panel((3, 0, 0), (0, 0, 1.5), (0, 1.5, 0), 1)]
+    screen = box((3, 0, 0), (3.001, 1.5, 1.5), 1, False)
     triangles = np.concatenate([*shell, *table, *lamp, *screen])
     return turned(triangles, seed) if seed else triangles
 
@@ -83,8 +83,8 @@ def furnished(seed):
 def test_a_furnished_room(seed):
     """No ray of a known pair is hidden; nearly all pairs none of whose rays is hidden are known."""
     rng, triangles = np.random.default_rng(seed), furnished(seed)
-    pairs, exchange, known = known_of(triangles)
-    before, seen = seen_shares(Octree(mesh_of(triangles)), triangles, pairs, 40, rng)
+    pairs, exchange, known = known_of(triangles, rng.permutation(all_pairs(len(triangles)))[:1500])
+    before, seen = seen_shares(Octree(mesh_of(triangles)), triangles, pairs, 60, rng)
     whole = seen == before
     assert whole[known & (exchange > 0)].all()
     assert (before[known & (exchange == 0)] == 0).all()
