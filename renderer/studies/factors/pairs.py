@@ -30,8 +30,9 @@ assert _PLANES + PLANE * MOST_PLANES <= 500
 _NO_PLANE = 2.0**10
 # No corner is taken to be in a plane that is farther off than so, as a share of the size of both triangles.
 _IN_PLANE = 2.0**-24
-# An exchange is known to this share of itself at least: needles and what is seen edge-on lose digits.
-_RELATIVE = 1e-7
+# An exchange is known if its error is at most this share of itself, or this share of the area of each face, so that it
+# is lost in their rows. Needles and what is seen edge-on lose digits.
+_RELATIVE, _OF_AREAS = 1e-7, 1e-11
 # The sides of a plane on which a triangle's corners are: behind or in it, before or in it, in it, on both.
 _BEHIND, _BEFORE, _IN, _ACROSS = range(4)
 
@@ -82,7 +83,8 @@ def exact_pairs(
     Notes
     -----
     The proof moves vertices by some roundings of their largest coordinate, see ``shaft``. A known exchange has a
-    relative error of 1e-11 at most; up to 1e-7 where a face is a needle or seen edge-on.
+    relative error of 1e-11 at most. Where a face is a needle or seen edge-on, it errs by up to 1e-7, or by 1e-11 of the
+    area of each face.
 
     Examples
     --------
@@ -191,7 +193,8 @@ def _exchange(tree, stack, memory, pair, rules):
         return unknown
     found = exchange_of(corners, n, offset(corners, 3 * n), m, rules)
     area = abs(found.area) if pair.both else found.area
-    return _Known(area, True) if found.error <= _RELATIVE * area else unknown
+    limit = maximum(_RELATIVE * area, _OF_AREAS * minimum(_area(memory), _area(offset(memory, 9))))
+    return _Known(area, True) if found.error <= limit and found.error < area else unknown
 
 
 @kernel
@@ -226,6 +229,14 @@ def _width(corners, n):
         if k + 1 < n:
             double = add(double, cross(way, sub(row3(corners, k + 1), p)))
     return math.sqrt(dot(double, double) / longest) if longest > 0.0 else 0.0
+
+
+@kernel
+def _area(corners):
+    """The area of a triangle."""
+    p = row3(corners, 0)
+    double = cross(sub(row3(corners, 1), p), sub(row3(corners, 2), p))
+    return 0.5 * math.sqrt(dot(double, double))
 
 
 @kernel
