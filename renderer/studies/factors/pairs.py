@@ -169,8 +169,9 @@ def _exchange(tree, stack, memory, pair, rules):
     plane_b = _plane(offset(memory, 9), minimum(error * (1.0 + size / width_b), most))
     side_a, side_b = _side(plane_b, memory), _side(plane_a, offset(memory, 9))
     if side_a == _IN or side_b == _IN:
-        # Faces that lie on each other may see each other whole or not at all.
-        return none if dot(plane_a.normal, plane_b.normal) > 0.0 else unknown
+        # Faces that lie on each other, front to front, may see each other whole or not at all.
+        alike = not pair.both and dot(plane_a.normal, plane_b.normal) > 0.0
+        return none if alike or _lie_side_by_side(memory, plane_a, plane_b) else unknown
     if pair.both and (side_a == _ACROSS or side_b == _ACROSS):
         return unknown
     if not pair.both and (side_a == _BEHIND or side_b == _BEHIND):
@@ -259,6 +260,23 @@ def _side(plane, corners):
     if low >= -plane.room:
         return _IN if high <= plane.room else _BEFORE
     return _BEHIND if high <= plane.room else _ACROSS
+
+
+@kernel
+def _lie_side_by_side(corners, plane_a, plane_b):
+    """Whether an edge of one of two triangles in one plane parts them."""
+    for first in range(2):
+        own, other = offset(corners, 9 * first), offset(corners, 9 - 9 * first)
+        plane = plane_b if first == 1 else plane_a
+        for k in range(3):
+            p = row3(own, k)
+            edge = sub(row3(own, k + 1 if k < 2 else 0), p)
+            out, least = cross(edge, plane.normal), np.inf
+            for corner in range(3):
+                least = minimum(least, dot(out, sub(row3(other, corner), p)))
+            if least >= -plane.room * math.sqrt(dot(edge, edge)):
+                return True
+    return False
 
 
 @kernel

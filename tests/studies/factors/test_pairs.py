@@ -174,6 +174,17 @@ def test_a_face_across_the_plane_of_the_other_exchanges_with_its_front_alone():
         np.testing.assert_allclose(whole, front, rtol=1e-11)
 
 
+def test_faces_in_one_plane_exchange_nothing_unless_they_lie_on_each_other():
+    for seed in range(3):
+        for way, known in (((1, 0, 0), True), ((0, -1, 0), True), ((0.7, 0.7, 0), True), ((0.4, 0.4, 0), False)):
+            for turn in (1, -1):
+                triangles = np.stack([FLOOR, np.add(FLOOR, way)[::turn]])
+                triangles = turned(triangles, seed) if seed else triangles
+                for both in (False, True):
+                    _, exchange, got = known_of(triangles, both=both)
+                    assert got[0] == (known or (turn == 1 and not both)) and exchange[0] == 0
+
+
 def test_both_sides():
     (right,), _ = known_of(np.stack([FLOOR, CEILING]))[1:]
     for first in (FLOOR, FLOOR[::-1]):
