@@ -108,14 +108,13 @@ def rows_of_part(max_rays: int) -> int:
 
 
 def trace_part(
-    tracing: Tracing, rows: Integers, first: Integers, targets: Integers, largest: NDArray[np.float64],
+    tracing: Tracing, rows: Integers, first: Integers, targets: Integers,
     update: Update = None,
 ) -> Arrays:  # fmt: skip
     """``trace_rows`` of rows, in ascending order, with what is known of these alone."""
-    number = tracing.surfaces.number
-    lengths, most = np.zeros(number, np.int64), np.zeros(number)
-    lengths[rows], most[rows] = np.diff(first), largest
-    known = Known(np.concatenate([[0], np.cumsum(lengths)]), targets, most)
+    lengths = np.zeros(tracing.surfaces.number, np.int64)
+    lengths[rows] = np.diff(first)
+    known = Known(np.concatenate([[0], np.cumsum(lengths)]), targets)
     return trace_rows(tracing, rows, known, update)
 
 
@@ -161,7 +160,7 @@ def _of_rows(known: Known, rows: Integers) -> Known:
     lengths = np.diff(known.first)[rows]
     first = np.concatenate([[0], np.cumsum(lengths)])
     entries = np.arange(first[-1]) + np.repeat(known.first[rows] - first[:-1], lengths)
-    return Known(first, known.targets[entries], known.largest[rows])
+    return Known(first, known.targets[entries])
 
 
 def _bytes_of(arrays: Arrays) -> bytes:

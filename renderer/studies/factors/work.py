@@ -41,5 +41,9 @@ class AtOnce:
 
 
 def face_pairs(tracing: Tracing, faces: Integers, update: Update = None) -> tuple[Floats, Flags]:
-    """The exchange (k,) of pairs of faces (k, 2), the lower first, and which of them are known."""
-    return exact_pairs(tracing.built, faces, tracing.threads, update)
+    """The exchange (k,) of pairs of faces (k, 2), the lower first, and which of them are known.
+
+    Of both sides if all faces send from both.
+    """
+    both = bool(tracing.surfaces.both.all())
+    return exact_pairs(tracing.built, faces, tracing.threads, update, both=both)
