@@ -23,7 +23,7 @@ pytest.importorskip("scipy")
 pytestmark = pytest.mark.judges(
     "octree-render study --groups", "octree-render study --max-rays", "octree-render study --rtol",
     "octree-render study --sides", "octree-render study kind",
-    "studies.ViewFactors.load", "studies.ViewFactors.save",
+    "studies.ViewFactors.load", "studies.ViewFactors.matrix", "studies.ViewFactors.save",
 )  # fmt: skip
 # Of a unit cube: a wall to the one opposite (Howell C-11) and to one beside it (C-14).
 OPPOSITE, BESIDE = 0.19982489569838746, 0.20004377607540316
