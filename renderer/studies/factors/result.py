@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from scipy.sparse import csr_array
+    from scipy.sparse import csr_array as csr_array
 else:
     csr_array = Any
 
@@ -176,6 +176,17 @@ class PointFactors:
     See Also
     --------
     view_factors_from
+
+    Examples
+    --------
+    A point below a roof sees the roof and the sky beside it.
+
+    >>> from renderer import Octree
+    >>> from renderer.studies import view_factors_from
+    >>> roof = Octree([[-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], [[0, 2, 1], [0, 3, 2]])
+    >>> factors = view_factors_from(roof, [[0, 0, 0]], [0, 0, 1], [0, 0], rtol=0.002)
+    >>> factors.matrix.toarray().round(2), factors.sky.round(2)
+    (array([[0.55]]), array([0.45]))
     """
 
     matrix: csr_array

@@ -151,8 +151,8 @@ def in_order(parts: list[tuple[Integers, RowHits]]) -> RowHits:
     begins, lengths = begins[order], lengths[order]
     first = np.concatenate([[0], np.cumsum(lengths)])
     entries = np.arange(first[-1]) + np.repeat(begins - first[:-1], lengths)
-    columns = (np.concatenate([part[k] for _, part in parts])[entries] for k in (1, 2, 3))
-    return RowHits(first, *columns, np.concatenate([part.rays for _, part in parts])[order])
+    targets, counts, errors = (np.concatenate([part[k] for _, part in parts])[entries] for k in (1, 2, 3))
+    return RowHits(first, targets, counts, errors, np.concatenate([part.rays for _, part in parts])[order])
 
 
 def _keys_of(tracing: Tracing, rows: Integers, begin: int, count: int) -> Generator[None, None, Integers]:
