@@ -112,7 +112,7 @@ class ViewFactors:
         >>> factors = view_factors(Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     factors.save(f"{folder}/factors.csv")
-        ...     print(Path(folder, "factors.csv").read_text())
+        ...     print(Path(folder, "factors.csv").read_text(), end="")
         surface,area,0,sky,backs,error
         0,0.5,0.0,1.0,0.0,0.0
         """
