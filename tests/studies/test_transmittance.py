@@ -235,3 +235,14 @@ def test_bad_shares_are_named(study: str, bad: Any, said: str) -> None:
 def test_bits_have_no_shares() -> None:
     with pytest.raises(ValueError, match=r"^transmittance: expected None with packed, as bits have no shares"):
         occlusion(Octree.from_mesh(box()), [0, 0, 0], None, np.eye(3), transmittance=[0.0] * 12, packed=True)
+
+
+@cases("size", [1e-40, 1e-10, 1e30, 1e45])
+def test_shares_are_those_of_any_size(size: float) -> None:
+    """The opaque and the translucent part of a mesh have units of their own, and one of them may be empty."""
+    mesh = Mesh.concatenate([square(1.0, 100.0), square(2.0, 1.0)])
+    octree = Octree(mesh.vertices * size, mesh.faces)
+    points = np.array([[0.5, 0.25, 0.0], [5.0, 5.25, 0.0], [5.0, 5.25, 1.0]]) * size
+    for low, high, left in ((0.5, 0.25, [0.125, 0.5, 1.0]), (0.5, 0.0, [0.0, 0.5, 1.0]), (1.0, 0.5, [0.5, 1.0, 1.0])):
+        asked = {"transmittance": [low, low, high, high]}
+        assert sun_hours(octree, points, [0, 0, 1], [[0.0, 0.0, 1.0]], **asked).tolist() == left  # type: ignore[arg-type]
