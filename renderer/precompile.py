@@ -35,6 +35,7 @@ from renderer.scene.needs import needs_of
 from renderer.scene.scene import Scene, SceneObject
 from renderer.shade.tile import render_tile
 from renderer.studies.factors.compute import checked_tracing
+from renderer.studies.factors.free import without_matrix
 from renderer.studies.factors.rows import nothing_known, trace_rows
 from renderer.studies.factors.work import face_pairs
 from renderer.studies.hidden import occlusion
@@ -131,6 +132,7 @@ def _exchange() -> None:
         tracing = checked_tracing(accelerator, sides="both", transmittance=[0.5, 0.0], max_rays=256)
         trace_rows(tracing, np.arange(2), nothing_known(2))
         face_pairs(tracing, np.array([[0, 1]]))
+        without_matrix(tracing)
 
 
 def _search() -> None:

@@ -286,3 +286,6 @@ def test_names_and_bits_come_back_from_a_file(room: Path, tmp_path: Path) -> Non
         ViewFactors.load(tmp_path / "none.npz")
     with pytest.raises(ValueError, match=r"path: expected a file that ends in \.npz or \.csv, got .*f\.txt"):
         found.save(tmp_path / "f.txt")
+    rays = view_factors(Octree.from_mesh(load_mesh(room)), form="rays", max_rays=8)
+    with pytest.raises(ValueError, match="form: expected view factors with form='matrix', got form='rays'"):
+        rays.save(tmp_path / "f.npz")

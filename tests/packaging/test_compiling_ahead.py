@@ -115,6 +115,7 @@ for tree in trees:
     for sides, shares in (("front", None), ("both", None), ("both", groups % 2 / 2)):
         with warnings.catch_warnings(action="ignore"):
             view_factors(tree, groups, sides=sides, transmittance=shares, **few)
+            view_factors(tree, groups, sides=sides, transmittance=shares, form="rays", max_rays=8)
             view_factors_from(tree, corners[:9], -corners[:9], groups, sides=sides, transmittance=shares, **few)
 public = {name for name, value in vars(Queries).items() if callable(value) and not name.startswith("_")}
 assert public == asked, public ^ asked

@@ -28,6 +28,7 @@ def save_factors(factors: ViewFactors, path: str | os.PathLike[str]) -> None:
     """``ViewFactors.save``."""
     target, count = as_path("path", path), len(factors.areas)
     check_factors_path("path", target, count)
+    expect(factors.errors is not None, "form", "view factors with form='matrix'", "form='rays', which has no file")
     write = _WRITERS[target.suffix.lower()]
     write_atomically(target, lambda file: write(factors, file))
 
