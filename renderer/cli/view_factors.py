@@ -19,7 +19,10 @@ _GROUPS = (
     "faces of a material"
 )
 _SIDES = "the sides on which faces send and receive; default: front"
-_RTOL = "add rays until the standard errors of a surface are at most R times its largest view factor; default: 0.02"
+_RTOL = (
+    "add rays until the share of what a surface sends that may arrive elsewhere, the root of the sum of its squared "
+    "errors, is at most R; default: 0.02"
+)
 # The options that are arguments of ``studies.view_factors``.
 OWN = ("sides", "rtol", "max_rays")
 
