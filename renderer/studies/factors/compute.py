@@ -177,6 +177,7 @@ def _known_pairs(tracing: Tracing, work: Work) -> KnownPairs:
     if worth is None:
         few = tracing._replace(max_rays=FIRST_RAYS)
         worth = pairs_worth(tracing, work.rows("survey", few, np.arange(number), nothing_known(number)))
+    assert worth is not None
     return known_of(tracing, worth, work)
 
 

@@ -36,7 +36,8 @@ class KnownPairs(NamedTuple):
     def sums(self, number: int) -> Floats:
         """The sum of each of the rows."""
         beside = np.where(self.rows == self.columns, 0.0, self.values)
-        return np.bincount(self.rows, self.values, number) + np.bincount(self.columns, beside, number)
+        ends = np.bincount(self.rows, self.values, number) + np.bincount(self.columns, beside, number)
+        return np.asarray(ends, np.float64)
 
     def known(self, number: int) -> Known:
         """The same as rows of targets that need no rays."""
@@ -91,6 +92,6 @@ def known_of(tracing: Tracing, worth: Worth, work: Work) -> KnownPairs:
     sound = ((surfaces.transmittance == 0.0) & (surfaces.both == two_sided))[faces].all(axis=1)
     exchange, known = work.pairs(tracing, faces)
     unknown = np.bincount(pair, ~(known & sound), len(sizes)) > 0
-    values = np.bincount(pair, exchange, len(sizes)) * np.where(own, 2.0, 1.0)
+    values: Floats = np.where(own, 2.0, 1.0) * np.bincount(pair, exchange, len(sizes))
     kept = ~unknown
     return KnownPairs(worth.rows[kept], worth.columns[kept], values[kept])

@@ -104,8 +104,8 @@ class ViewFactors:
         OSError
             If the file cannot be written.
         ValueError
-            If the name ends otherwise, with ``form="rays"``, or for a ``.csv`` of more than 16,380 surfaces, the columns
-            that a spreadsheet has.
+            If the name ends otherwise, with ``form="rays"``, or for a ``.csv`` of more than 16,380 surfaces, which is
+            what a spreadsheet has columns for.
 
         Examples
         --------

@@ -130,13 +130,10 @@ def _tally(keys: Integers, rows: Integers, known: Known, rtol: float, last: bool
     unfinished = np.empty(count, np.bool_)
     spans = [known.targets[known.first[row] : known.first[row + 1]] for row in rows]
     first = np.concatenate([[0], np.cumsum([len(span) for span in spans])])
-    written = tally_rows(
-        keys, first, np.concatenate(spans), rtol, last, targets, counts, errors, lengths,
-        unfinished,
-    )  # fmt: skip
+    written = tally_rows(keys, first, np.concatenate(spans), rtol, last, targets, counts, errors, lengths, unfinished)
     ends = np.concatenate([[0], np.cumsum(lengths[~unfinished])])
-    columns = (column[:written].copy() for column in (targets, counts, errors))
-    return RowHits(ends, *columns, np.full(len(ends) - 1, rays)), unfinished
+    targets, counts, errors = (column[:written].copy() for column in (targets, counts, errors))
+    return RowHits(ends, targets, counts, errors, np.full(len(ends) - 1, rays)), unfinished
 
 
 def in_order(parts: list[tuple[Integers, RowHits]]) -> RowHits:

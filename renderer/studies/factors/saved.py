@@ -89,6 +89,7 @@ def _write_npz(factors: ViewFactors, file: BinaryIO) -> None:
 
 def _write_csv(factors: ViewFactors, file: BinaryIO) -> None:
     names, matrix, errors = names_of(factors), factors.matrix, factors.errors
+    assert errors is not None
     text = TextIOWrapper(file, encoding="utf-8", newline="")
     table = csv.writer(text, lineterminator="\n")
     table.writerow(["surface", "area", *names, "sky", "backs", "error"])

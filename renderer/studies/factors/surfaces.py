@@ -51,7 +51,7 @@ def check_surfaces(mesh: Mesh, groups: ArrayLike | None, sides: str, transmittan
     both = (shares > 0.0) | (sides == "both")
     # rule: area-that-sends
     weights = areas_of(mesh) * np.where(both, 2.0, 1.0) * (1.0 - shares)
-    areas = np.bincount(of_face, weights)
+    areas = np.asarray(np.bincount(of_face, weights), np.float64)
     empty = ~(areas > 0.0)
     if empty.any():
         row = int(empty.argmax())
