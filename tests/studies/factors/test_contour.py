@@ -245,9 +245,10 @@ def test_far_apart(distance):
         assert exchange(first, second) == pytest.approx(point, rel=max(1e-11, 1e3 / distance**2))
 
 
-@given(st.integers(0, 10**6), st.sampled_from([0.009, 0.0099, 0.02, 0.05, 0.07, 0.079]))
+@given(st.integers(0, 10**6), st.sampled_from([0.0099, 0.015, 0.024, 0.05, 0.079, 0.19]))
+@settings(max_examples=200)
 def test_rules_are_used_only_where_they_are_exact(seed, share):
-    """Below the limits, parts add up: theirs have a quarter of the share, so that they err by less."""
+    """Parts add up: their shares are a quarter, so that they err by less. Over contours, more is lost by rounding."""
     rng = np.random.default_rng(seed)
     first, second = rng.normal(size=(2, 3, 3))
     first, second = (corners - corners.mean(axis=0) for corners in (first, second))
@@ -259,7 +260,8 @@ def test_rules_are_used_only_where_they_are_exact(seed, share):
     if min(abs(n @ way) / np.linalg.norm(n), abs(m @ way) / np.linalg.norm(m)) < 0.3 * np.linalg.norm(way):
         return
     cut = [[part for half in quarters(corners) for part in quarters(half)] for corners in (first, second)]
-    assert exchange(first, second) == pytest.approx(sum(exchange(a, b) for a, b in product(*cut)), rel=3e-12)
+    rounding = 3e-12 if share < 0.08 else 1e-9
+    assert exchange(first, second) == pytest.approx(sum(exchange(a, b) for a, b in product(*cut)), rel=rounding)
 
 
 def _before(first, second):
