@@ -21,8 +21,8 @@ from renderer.trace.layout import Tree
 from renderer.trace.trees import tree_pointers
 from renderer.trace.walk import stack_size
 
-# Pairs of a chunk, and of a call, so that Ctrl-C need not wait: most pairs take some microseconds, those whose hull many
-# faces touch milliseconds.
+# Pairs of a chunk, and of a call, so that Ctrl-C need not wait: most pairs take some microseconds, but milliseconds if
+# thousands of faces touch their hull.
 _CHUNK, _CALL = 512, 32
 # Where a kernel keeps both polygons, their normals and their planes; a triangle cut by one plane has four corners.
 _CORNERS, _CUT, _NORMALS, _PLANES = 0, 24, 48, 54
