@@ -45,25 +45,29 @@ def balanced(exchanges: Exchanges, areas: Floats) -> Exchanges:
     An entry is multiplied by exp(freedom * (m_i + m_j)), with a number m for each row, so it stays symmetric, and not
     negative. Where no numbers give these sums, they are as near as the steps come.
     """
-    rows, columns, values, freedom, outside, outside_freedom = exchanges
+    rows, columns, _, freedom, _, outside_freedom = exchanges
     count, levels, on_diagonal = len(areas), np.zeros(len(areas)), rows == columns
 
     def sums(entries: Floats, others: Floats) -> Floats:
         ends = np.bincount(rows, entries, count) + np.bincount(columns, np.where(on_diagonal, 0.0, entries), count)
         return ends + others
 
+    found, least = (exchanges.values, exchanges.outside), np.inf
     for _ in range(_STEPS):
         now, open_now = _at(exchanges, levels)
-        missing = areas - sums(now, open_now)
-        if (np.abs(missing) <= _EXACT * areas).all():
-            break
         slopes = now * freedom
         diagonal = sums(np.where(on_diagonal, 2.0, 1.0) * slopes, open_now * outside_freedom)
+        missing = np.where(diagonal > 0.0, areas - sums(now, open_now), 0.0)
+        worst = (np.abs(missing) / areas).max(initial=0.0)
+        if worst >= least:
+            break
+        found, least = (now, open_now), worst
+        if worst <= _EXACT:
+            break
         step = _step(rows, columns, np.where(on_diagonal, 0.0, slopes), diagonal, missing)
         change = max(np.abs(freedom * (step[rows] + step[columns])).max(initial=0.0), _MOST)
         levels += step * (_MOST / change)
-    values, outside = _at(exchanges, levels)
-    return exchanges._replace(values=values, outside=outside)
+    return exchanges._replace(values=found[0], outside=found[1])
 
 
 def _at(exchanges: Exchanges, levels: Floats) -> tuple[Floats, Floats]:
@@ -75,15 +79,13 @@ def _at(exchanges: Exchanges, levels: Floats) -> tuple[Floats, Floats]:
 def _step(rows: Integers, columns: Integers, slopes: Floats, diagonal: Floats, missing: Floats) -> Floats:
     """The step of Newton's method; a row of which nothing may change has none."""
     sparse, count = scipy_sparse(), len(missing)
-    free = diagonal > 0.0
     upper = sparse.csr_array((slopes, (rows, columns)), shape=(count, count))
-    inverse = np.where(free, 1.0 / np.where(free, diagonal, 1.0), 0.0)
+    inverse = np.divide(1.0, diagonal, out=np.zeros(count), where=diagonal > 0.0)
 
     def times(x: Floats) -> Floats:
         return np.asarray(upper @ x + upper.T @ x + diagonal * x)
 
     operator = sparse.linalg.LinearOperator((count, count), times)
     guess = sparse.linalg.LinearOperator((count, count), lambda x: inverse * x)
-    wanted = np.where(free, missing, 0.0)
-    found, _ = sparse.linalg.cg(operator, wanted, rtol=_STEP_ERROR, maxiter=_STEP_ITERATIONS, M=guess)
+    found, _ = sparse.linalg.cg(operator, missing, rtol=_STEP_ERROR, maxiter=_STEP_ITERATIONS, M=guess)
     return np.asarray(found)
