@@ -187,7 +187,7 @@ class _Edges:
 
 
 def _expect_few(argument: str, count: float) -> None:
-    expect(count <= MOST_PATCHES, argument, f"at most {MOST_PATCHES} patches from it", f"{count:.0f} or more")
+    expect(count <= MOST_PATCHES, argument, f"at most {MOST_PATCHES} patches from it", f"{count:.3g} or more")
 
 
 def _cut(argument: str, given: Patches, edges: _Edges, cut: NDArray[np.bool_]) -> Patches:
