@@ -1,6 +1,7 @@
 """Radiosity against closed forms and a dense solution: values, the proven bound, energy, and bad input."""
 
 from dataclasses import replace
+from fractions import Fraction
 
 import enclosures
 import numpy as np
@@ -10,6 +11,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import aslinearoperator
 
 from renderer.radiosity import radiosity
+from renderer.radiosity.surfaces import check_factors
+from renderer.radiosity.system import System, amplification_of
 
 pytestmark = pytest.mark.judges(
     "radiosity.radiosity", "radiosity.Radiosity", "radiosity.Balance", "radiosity.Balance.error"
@@ -101,6 +104,32 @@ def test_the_error_is_within_its_bound(n, rtol, is_open):
     # As computed here, to rounding of numbers of about 1.
     assert abs(residual - found.residual) < 1e-14 * found.values.max()
     assert found.bound >= residual
+
+
+def test_the_bound_holds_against_exact_arithmetic():
+    """One surface that sees itself alone: B = E / (1 - rho). A residual may round to 0 beside an error that is not."""
+    rng, residuals = np.random.default_rng(0), []
+    for emission, rho in rng.uniform(0.1, 0.99, (100, 2)):
+        found = radiosity(enclosures.sphere(np.ones(1)), emission, rho, rtol=1e-12)
+        error = abs(Fraction(float(found.values[0, 0])) - Fraction(float(emission)) / (1 - Fraction(float(rho))))
+        assert error <= Fraction(found.bound)
+        residuals.append(found.residual if error else 1.0)
+    assert min(residuals) == 0.0
+
+
+def test_the_inverse_is_bounded_also_where_some_reflect_all():
+    """As adiabatic surfaces do. The bound is of the largest row sum, and not much more."""
+    for seed in range(40):
+        factors, emission, rho, _ = drawn(seed, 12, is_open=seed % 2 == 0)
+        rho = rho[:, :1]
+        if seed % 4 < 2:
+            rho[4:] = 1.0
+        exchange = check_factors(factors)
+        inverse = np.linalg.inv(np.eye(12) - rho * factors.exchange.toarray() / factors.areas[:, None])
+        exact = inverse.sum(axis=1).max()
+        found = amplification_of(System(exchange, emission, rho))
+        assert exact <= found * (1 + 1e-12)
+        assert seed % 4 >= 2 or found <= 2.1 * exact
 
 
 def test_iterations_do_not_grow_with_the_surfaces():
