@@ -63,7 +63,7 @@ def solved(system: System, amplification: float, rtol: float, max_iterations: in
     Raises ``ValueError`` naming ``rtol`` if rounding alone exceeds that, or ``max_iterations`` if there are not enough.
     """
     operator, wanted, weights = _symmetric(system)
-    z, iterations, tolerance = np.zeros(wanted.size), 0, rtol / amplification
+    z, iterations, tolerance = np.zeros(wanted.size), 0, rtol
     while True:
         z, used = _iterate(operator, wanted, z, tolerance, max_iterations - iterations)
         iterations += used

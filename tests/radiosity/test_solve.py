@@ -10,7 +10,7 @@ from cases import cases
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import aslinearoperator
 
-from renderer.radiosity import radiosity
+from renderer.radiosity import radiosity, system
 from renderer.radiosity.surfaces import check_factors
 from renderer.radiosity.system import System, amplification_of
 
@@ -191,6 +191,29 @@ def test_areas_of_very_different_sizes():
     found = radiosity(factors, [1.0, 0.0, 0.0, 0.0], 0.9, rtol=1e-9)
     mean = areas[0] / areas.sum()
     np.testing.assert_allclose(found.values[:, 0], [1.0 + 9.0 * mean, *(9.0 * mean,) * 3], atol=found.bound)
+
+
+def test_iterations_are_counted_and_limited_over_all_tries(monkeypatch):
+    """With much light to and fro the bound needs more than the first try of conjugate gradients."""
+    factors, emission, _, _ = drawn(8, 30, is_open=False)
+    tries, iterate = [], system._iterate
+
+    def noted(*arguments):
+        tries.append(iterate(*arguments))
+        return tries[-1]
+
+    monkeypatch.setattr(system, "_iterate", noted)
+    whole = radiosity(factors, emission, 0.99999, rtol=1e-6)
+    used = [count for _, count in tries]
+    assert len(used) > 1 and used[-1] > 1 and whole.iterations == sum(used)
+    again = radiosity(factors, emission, 0.99999, rtol=1e-6, max_iterations=sum(used))
+    np.testing.assert_array_equal(again.values, whole.values)
+    # One more than the first try has is enough here.
+    fewer = radiosity(factors, emission, 0.99999, rtol=1e-6, max_iterations=used[0] + 1)
+    assert fewer.iterations == used[0] + 1 < sum(used)
+    for most in (1, used[0]):
+        with pytest.raises(ValueError, match=f"^max_iterations: expected more iterations, .*, got {most}$"):
+            radiosity(factors, emission, 0.99999, rtol=1e-6, max_iterations=most)
 
 
 def test_the_exchange_may_be_an_operator():
