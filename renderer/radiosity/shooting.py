@@ -155,7 +155,6 @@ class Shooting(Iterator[Shot]):
         power = self._unshot.sum(axis=1) * self._areas
         if power.sum() <= self._rtol * self._first:
             raise StopIteration
-        # rule: brightest-first
         brightest = int(power.argmax())
         surfaces, shares = self._rows.row(brightest)
         gain = self._rho[surfaces] * self._unshot[brightest]

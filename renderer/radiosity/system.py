@@ -69,7 +69,6 @@ def solved(system: System, amplification: float, rtol: float, max_iterations: in
         iterations += used
         found = _with_bound(system, weights * z.reshape(wanted.shape), amplification, iterations)
         largest = float(found.values.max(initial=0.0))
-        # rule: stop-by-bound
         if found.bound <= rtol * largest:
             return found
         least = _rounding(system.exchange, largest) * amplification / largest
@@ -148,7 +147,6 @@ def _with_bound(system: System, returned: Floats, amplification: float, iteratio
     values = source + np.maximum(returned, 0.0)
     gathered = _gathered(exchange, values)
     residual = float(np.abs((source - values) + system.reflectance * gathered).max(initial=0.0))
-    # rule: proven-bound
     bound = (residual + _rounding(exchange, float(values.max(initial=0.0)))) * amplification
     return Solution(values, gathered, residual, bound, iterations)
 
