@@ -123,6 +123,16 @@ def test_a_sphere_sees_itself_by_the_share_of_its_area():
     assert (off < 5.0 * found.errors.toarray()[0, far] + 0.1 * shares[far]).all()
 
 
+def test_plates_that_send_from_both_sides_are_exact_too():
+    plates = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    vertices, faces = joined((plates, faces), (plates + np.eye(3)[2], faces))
+    found = view_factors(Octree(vertices, faces), [0, 0, 1, 1], sides="both")
+    check_laws(found)
+    assert found.areas.tolist() == [2.0, 2.0]
+    assert found.matrix[0, 1] == pytest.approx(0.5 * OPPOSITE, rel=1e-9)
+
+
 @cases("share", [0.0, 0.25, 0.75])
 def test_a_screen_lets_its_share_through(share):
     """Half way between two squares hangs a screen, larger than any line between them needs."""
