@@ -7,6 +7,7 @@ import pytest
 from renderer import Mesh, Octree
 from renderer.mesh.shapes import box, icosphere
 from renderer.radiosity import Shooting, adaptive, net_heat, patches, radiosity
+from renderer.radiosity.surfaces import check_factors
 from renderer.radiosity.thermal import SIGMA
 from renderer.studies import view_factors
 
@@ -35,6 +36,26 @@ def test_in_a_closed_room_b_is_one_and_no_heat_is_made(cellar):
     assert np.abs(heat.net).max() > 1.0 and abs(heat.net.sum()) < 1e-6
     still = net_heat(factors, rng.uniform(0.1, 1.0, len(rho)), 300.0)
     assert np.abs(still.flux).max() < 1e-6
+
+
+def test_rays_in_place_of_a_matrix(cellar):
+    """The same system as by the matrix that the operator has on unit vectors, and a bound that holds."""
+    cut, _ = cellar
+    rng = np.random.default_rng(3)
+    n = len(cut.faces)
+    factors = view_factors(Octree.from_mesh(cut.mesh), form="rays", max_rays=1024)
+    emission, rho = rng.random((n, 3)), rng.random((n, 3)) * 0.9
+    found = radiosity(factors, emission, rho, rtol=1e-9)
+    matrix = (factors.exchange @ np.eye(n)) / factors.areas[:, None]
+    exact = [np.linalg.solve(np.eye(n) - rho[:, [k]] * matrix, emission[:, k]) for k in range(3)]
+    assert np.abs(found.values.T - exact).max() <= found.bound <= 1e-9 * found.values.max()
+    assert abs(net_heat(factors, 0.5, rng.uniform(280.0, 320.0, n)).net.sum()) < 1e-4
+    # Sums of more terms than there are surfaces.
+    leaving = factors.exchange.targets
+    terms = 1024 + np.bincount(leaving.ravel(), minlength=n)[:n].max()
+    assert check_factors(factors).slack == (terms + 12) * np.finfo(float).eps
+    with pytest.raises(ValueError, match=r"^scene: expected an octree, or view factors with form='matrix', got some"):
+        Shooting(factors, emission, rho)
 
 
 def test_a_lamp_in_a_cube():
