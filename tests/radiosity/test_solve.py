@@ -132,7 +132,8 @@ def test_the_inverse_is_bounded_also_where_some_reflect_all():
         exact = inverse.sum(axis=1).max()
         found = amplification_of(System(exchange, emission, rho))
         assert exact <= found * (1 + 1e-12)
-        assert seed % 4 >= 2 or found <= 2.1 * exact
+        # In an open one it is by the least loss of a row.
+        assert seed % 4 != 1 or found <= 2.1 * exact
 
 
 def test_iterations_do_not_grow_with_the_surfaces():

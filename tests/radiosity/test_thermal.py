@@ -157,7 +157,7 @@ def test_adiabatic_rooms_apart_from_the_others_are_named():
 
 
 def test_what_stands_on_a_floor_covers_it():
-    """A box on the floor of a room, whose bottom is left out: heat is as of the floor that is seen, and adds up to 0."""
+    """A box without a bottom on the floor of a room: heat is that of the floor that is seen, and adds up to 0."""
     room, thing = box((0, 0, 0), (4, 3, 2)), box((1, 1, 0), (2, 2, 1))
     sides = thing.faces[thing.face_normals()[:, 2] > -0.5]
     octree = Octree.from_mesh(Mesh.concatenate(Mesh(room.vertices, room.faces[:, ::-1]), Mesh(thing.vertices, sides)))
