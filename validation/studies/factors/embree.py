@@ -37,7 +37,7 @@ def check(name: str, quick: bool) -> dict[str, Any]:
     mean = np.clip((ours + theirs) / 2.0, 1.0 / rays, 1.0 - 1.0 / rays)
     errors = np.sqrt(stated**2 + mean * (1.0 - mean) / rays)
     apart = np.abs(ours - theirs) / errors
-    return {"subject": name, "surfaces": len(ours), "rays": rays, "entries": ours.size,
+    return {"subject": f"view factors of a {name}", "surfaces": len(ours), "rays": rays, "entries": ours.size,
             "difference": float(np.abs(ours - theirs).max()), "apart": float(apart.max()),
             "mean_square": float(np.mean(apart[(ours > 0.0) | (theirs > 0.0)] ** 2))}  # fmt: skip
 

@@ -18,6 +18,8 @@ FORMS = {form.__name__: form for form in (street_with_block, box_in_room, disc_b
 # which moves the slope over four or six of them by less than this.
 SLACK = 0.05
 SLOPE = -0.5 + SLACK
+# Squares of errors over those that are stated, in the mean.
+HONEST = 2.0
 
 
 def check(name: str, quick: bool) -> dict[str, Any]:
@@ -27,7 +29,7 @@ def check(name: str, quick: bool) -> dict[str, Any]:
     true, stated = ([float(np.sqrt(np.mean(part**2))) for part in parts] for parts in zip(*curves, strict=True))
     # Over all numbers of rays: of each the mean of squares over that of those stated.
     ratio = float(np.mean([(a / b) ** 2 for a, b in zip(true, stated, strict=True)]))
-    return {"subject": form.name, "counts": list(counts), "entries": len(curves[0][0]), "rms": true, "stated": stated,
+    return {"subject": f"errors of {form.name}", "counts": list(counts), "entries": len(curves[0][0]), "rms": true, "stated": stated,
             "slope": slope(counts, true), "ratio": ratio}  # fmt: skip
 
 
