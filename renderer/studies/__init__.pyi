@@ -6,6 +6,10 @@ from .directions import fibonacci_hemisphere as fibonacci_hemisphere
 from .directions import fibonacci_sphere as fibonacci_sphere
 from .directions import reinhart as reinhart
 from .directions import tregenza as tregenza
+from .factors.compute import view_factors as view_factors
+from .factors.points import view_factors_from as view_factors_from
+from .factors.result import PointFactors as PointFactors
+from .factors.result import ViewFactors as ViewFactors
 from .grid import grid_points as grid_points
 from .hidden import occlusion as occlusion
 from .places import FacePoints as FacePoints

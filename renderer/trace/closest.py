@@ -1,7 +1,7 @@
 """Closest and any hits of a batch of rays: in chunks, on threads."""
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,23 +86,13 @@ def _run(tree: Tree, rays: RayBatch, count: int, found: HitArrays, threads: int,
     size = min(CHUNK, max(_LEAST_CHUNK, count // (16 * threads)))
     if not tree.has_nodes:
         size = min(size, rays_against_blocks(tree))
-    origins, directions, t_min, t_max, starts = rays
-    own = ALONE if starts is NO_STARTS else starts
-    arrays, bad = (tree.descriptor, origins, directions, t_min, t_max, own, *found, any_hit), list[int]()
+    bad = list[int]()
 
     def trace(begin: int, end: int) -> Iterator[None]:
         # Only chunks after a bad ray are left out, so the first bad ray is always found.
         if bad and bad[0] < begin:
             return
-        scratch, row = _take_scratch(tree.depth), -1
-        if tree.has_nodes:
-            reached, following, waiting = begin, 0, 0
-            while row < 0 and (reached < end or following < waiting):
-                reached, following, waiting, row = trace_chunk(*arrays, scratch, reached, following, waiting, end)
-                yield
-        else:
-            row = search_chunk(*arrays, scratch.holders, begin, end)
-        _local.scratch = scratch
+        row = yield from find_range(tree, rays, found, any_hit, begin, end)
         if row >= 0:
             bad.append(row)
 
@@ -113,6 +103,28 @@ def _run(tree: Tree, rays: RayBatch, count: int, found: HitArrays, threads: int,
         for_chunks(trace, count, size, threads)
     if bad:
         reject(rays, min(bad), tree.scale)
+
+
+def find_range(
+    tree: Tree, rays: RayBatch, found: HitArrays, any_hit: bool, begin: int, end: int
+) -> Generator[None, None, int]:
+    """Trace up to CHUNK rays begin:end of a batch on the caller's thread, and yield where this can be stopped.
+
+    Returns the row of the first ray out of range, or -1.
+    """
+    origins, directions, t_min, t_max, starts = rays
+    own = ALONE if starts is NO_STARTS else starts
+    arrays = (tree.descriptor, origins, directions, t_min, t_max, own, *found, any_hit)
+    scratch, row = _take_scratch(tree.depth), -1
+    if tree.has_nodes:
+        reached, following, waiting = begin, 0, 0
+        while row < 0 and (reached < end or following < waiting):
+            reached, following, waiting, row = trace_chunk(*arrays, scratch, reached, following, waiting, end)
+            yield
+    else:
+        row = search_chunk(*arrays, scratch.holders, begin, end)
+    _local.scratch = scratch
+    return int(row)
 
 
 class _Local(threading.local):

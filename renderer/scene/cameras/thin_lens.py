@@ -12,6 +12,7 @@ from renderer.arguments.fields import stated
 from renderer.arguments.limits import FARTHEST
 from renderer.arguments.types import ArrayLike
 from renderer.numerics.film_rays import affine_map, affine_rays, unit_rows
+from renderer.numerics.mixing import mixed
 from renderer.scene.cameras.base import Floats
 from renderer.scene.cameras.perspective import PerspectiveCamera
 
@@ -106,17 +107,10 @@ class ThinLensCamera(PerspectiveCamera):
 def lens_places(x: Floats, y: Floats, number: int) -> tuple[Floats, Floats]:
     """Places in the unit square for a sample of the pixels at film positions ``x`` and ``y``."""
     column, row = (np.floor(place).astype(np.int64).astype(np.uint64) for place in (x, y))  # also beside the film
-    mixed = _mixed(column << np.uint64(32) | row)
-    starts = mixed >> np.uint64(32), mixed & np.uint64(0xFFFFFFFF)
+    mixed_bits = mixed(column << np.uint64(32) | row)
+    starts = mixed_bits >> np.uint64(32), mixed_bits & np.uint64(0xFFFFFFFF)
     u, v = ((start.astype(np.float64) / 2.0**32 + number * step) % 1.0 for start, step in zip(starts, _R2, strict=True))
     return u, v
-
-
-def _mixed(numbers: np.ndarray) -> np.ndarray:
-    """The finaliser of SplitMix64: a bijection of uint64 that mixes all bits."""
-    numbers = (numbers ^ numbers >> np.uint64(30)) * np.uint64(0xBF58476D1CE4E5B9)
-    numbers = (numbers ^ numbers >> np.uint64(27)) * np.uint64(0x94D049BB133111EB)
-    return numbers ^ numbers >> np.uint64(31)
 
 
 def _on_disk(u: Floats, v: Floats) -> tuple[Floats, Floats]:

@@ -1,0 +1,1 @@
+"""View factors: which share of what leaves one surface arrives at another."""

@@ -1,0 +1,238 @@
+"""What the rays of many rows hit, row by row until their errors are small enough."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.numerics.mixing import mixed
+from renderer.queryable import Built
+from renderer.results.hits import Hits
+from renderer.studies.factors.aim import REPLICATES, WEYL, Senders, aim_rows, shifts_of
+from renderer.studies.factors.surfaces import Surfaces
+from renderer.studies.factors.tally import tally_rows
+from renderer.system.terminal import progress_bar
+from renderer.system.threads import for_chunks
+from renderer.trace.batch import CHUNK, Leaving, RayBatch, offset_origins, reject
+from renderer.trace.closest import find_range
+from renderer.trace.leaving import check_leaving
+from renderer.trace.rays import HitArrays
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+# The rays of a row at first: the least that tells a share of a hundredth from one of a fiftieth.
+FIRST_RAYS = 256
+_ROWS = CHUNK // FIRST_RAYS
+# Targets after the last surface.
+SKY, BACK = 0, 1
+_EVERYWHERE = (np.zeros(1), np.full(1, np.inf))
+
+
+class Known(NamedTuple):
+    """The entries of rows that need no rays, as compressed rows.
+
+    first    (n + 1,) int64; targets (k,) int64, sorted in each row; largest (n,) float64: the largest entry of each row
+    """
+
+    first: Integers
+    targets: Integers
+    largest: Floats
+
+
+class RowHits(NamedTuple):
+    """What the rays of n rows hit, as compressed rows; of the targets SKY and BACK follow the surfaces.
+
+    first    (n + 1,) int64
+    targets  (k,) int64, sorted in each row
+    counts   (k,) int64: the rays that ended there
+    errors   (k,) float64: the standard error of counts / rays
+    rays     (n,) int64
+    """
+
+    first: Integers
+    targets: Integers
+    counts: Integers
+    errors: Floats
+    rays: Integers
+
+    @property
+    def rows(self) -> Integers:
+        """The row of each target, (k,)."""
+        return np.repeat(np.arange(len(self.rays)), np.diff(self.first))
+
+    def share(self, target: int) -> Floats:
+        """The share of each row's rays that ended at a target, (n,)."""
+        chosen, count = self.targets == target, len(self.rays)
+        hits = np.bincount(self.rows[chosen], self.counts[chosen], count)
+        return np.divide(hits, self.rays, out=np.zeros(count), where=self.rays > 0)
+
+
+class Tracing(NamedTuple):
+    """What rows are traced in, and with which aim; see ``view_factors``."""
+
+    built: Built
+    surfaces: Surfaces
+    senders: Senders
+    rtol: float
+    max_rays: int
+    threads: int
+    progress: bool
+
+
+def nothing_known(rows: int) -> Known:
+    """``Known`` of no entries."""
+    return Known(np.zeros(rows + 1, np.int64), np.empty(0, np.int64), np.zeros(rows))
+
+
+def trace_rows(tracing: Tracing, rows: Integers, known: Known) -> RowHits:
+    """Trace the rays of some rows; ``known`` has all rows."""
+    parts: list[tuple[Integers, RowHits]] = []
+    with progress_bar(len(rows), "surface", tracing.progress) as update:
+
+        def trace(begin: int, end: int) -> Iterator[None]:
+            yield from _trace_until(tracing, begin + np.arange(end - begin), rows, known, parts)
+
+        for_chunks(trace, len(rows), _ROWS, tracing.threads, update)
+    return _in_order(parts, len(rows))
+
+
+def _trace_until(
+    tracing: Tracing, places: Integers, rows: Integers, known: Known, parts: list[tuple[Integers, RowHits]]
+) -> Iterator[None]:
+    """Trace the rows at some places until each has small errors or its most rays; add what they hit to ``parts``."""
+    keys = np.empty((len(places), 0), np.int64)
+    while len(places):
+        rays = keys.shape[1]
+        more = min(max(rays, FIRST_RAYS), tracing.max_rays - rays)
+        new = yield from _keys_of(tracing, rows[places], rays, more)
+        keys = np.sort(np.concatenate([keys, new], axis=1), axis=1)
+        hits, unfinished = _tally(keys, rows[places], known, tracing.rtol, rays + more == tracing.max_rays)
+        parts.append((places[~unfinished], hits))
+        places, keys = places[unfinished], keys[unfinished]
+
+
+def _tally(keys: Integers, rows: Integers, known: Known, rtol: float, last: bool) -> tuple[RowHits, NDArray[np.bool_]]:
+    """What rows hit by their sorted keys, of those that need no more rays; and which of them do."""
+    count, rays = keys.shape
+    targets, counts = np.empty((2, count * rays), np.int64)
+    errors, lengths = np.empty(count * rays), np.empty(count, np.int64)
+    unfinished = np.empty(count, np.bool_)
+    spans = [known.targets[known.first[row] : known.first[row + 1]] for row in rows]
+    first = np.concatenate([[0], np.cumsum([len(span) for span in spans])])
+    tally_rows(
+        keys, first, np.concatenate(spans), known.largest[rows], rtol, targets, counts, errors, lengths, unfinished
+    )
+    unfinished &= not last
+    used = (np.arange(rays) < np.where(unfinished, 0, lengths)[:, None]).reshape(-1)
+    ends = np.concatenate([[0], np.cumsum(lengths[~unfinished])])
+    return RowHits(ends, targets[used], counts[used], errors[used], np.full(len(ends) - 1, rays)), unfinished
+
+
+def _in_order(parts: list[tuple[Integers, RowHits]], rows: int) -> RowHits:
+    """The hits of rows at their places, from records of some rows each."""
+    places = np.concatenate([part[0] for part in parts]) if parts else np.empty(0, np.int64)
+    order = np.argsort(places, kind="stable")
+    begins = np.concatenate([part.first[:-1] for _, part in parts]) if parts else places
+    sizes = np.array([len(part.targets) for _, part in parts], np.int64)
+    begins = begins + np.repeat(np.cumsum(sizes) - sizes, [len(own) for own, _ in parts])
+    lengths = np.concatenate([np.diff(part.first) for _, part in parts]) if parts else places
+    begins, lengths = begins[order], lengths[order]
+    first = np.concatenate([[0], np.cumsum(lengths)])
+    entries = np.arange(first[-1]) + np.repeat(begins - first[:-1], lengths)
+    columns = (np.concatenate([part[k] for _, part in parts])[entries] for k in (1, 2, 3))
+    return RowHits(first, *columns, np.concatenate([part.rays for _, part in parts])[order])
+
+
+def _keys_of(tracing: Tracing, rows: Integers, begin: int, count: int) -> Generator[None, None, Integers]:
+    """What the rays from ``begin`` on hit, ``count`` of each row: keys as of ``tally_rows``, (rows, count)."""
+    keys, shifts = np.empty((len(rows), count), np.int64), shifts_of(rows)
+    width = min(count, CHUNK)
+    height = max(1, CHUNK // width)
+    for top in range(0, len(rows), height):
+        for left in range(0, count, width):
+            own, some = slice(top, top + height), min(width, count - left)
+            targets = yield from _targets_of(tracing, rows[own], shifts[own], begin + left, some)
+            sequence = (begin + left + np.arange(some)) % REPLICATES
+            keys[own, left : left + some] = targets.reshape(-1, some) * REPLICATES + sequence
+    return keys
+
+
+def _targets_of(
+    tracing: Tracing, rows: Integers, shifts: NDArray[np.uint64], begin: int, count: int
+) -> Generator[None, None, Integers]:
+    """The targets of some rays of some rows, one row after the other."""
+    total, (mesh, tree) = len(rows) * count, tracing.built
+    origins, directions = np.empty((2, total, 3))
+    faces, codes = np.empty((2, total), np.int64)
+    aim_rows(*tracing.senders, shifts, rows, begin, count, origins, directions, faces, codes)
+    rays = RayBatch(origins, directions, *_EVERYWHERE)
+    batch = offset_origins(rays, Leaving(faces, codes, np.empty((0, 3))), mesh, tree.scale, 1)
+    hits = yield from _closest(tracing, batch)
+    if tracing.surfaces.transmittance.any():
+        yield from _pass_through(tracing, hits, directions, shifts, begin)
+    return _targets_at(tracing.surfaces, hits)
+
+
+def _closest(tracing: Tracing, rays: RayBatch) -> Generator[None, None, Hits]:
+    mesh, tree = tracing.built
+    t, u, v = np.empty((3, rays.number))
+    face, side, pile = np.empty((3, rays.number), np.int64)
+    found = HitArrays(t, face, u, v, side, pile, np.empty(0, np.bool_))
+    row = yield from find_range(tree, rays, found, False, 0, rays.number)
+    if row >= 0:
+        reject(rays, row, tree.scale)
+    return Hits(t, face, u, v, mesh, None, side, pile)
+
+
+def _pass_through(
+    tracing: Tracing, hits: Hits, directions: Floats, shifts: NDArray[np.uint64], begin: int
+) -> Iterator[None]:
+    """Let rays go on through the faces that they hit, as often as these let a share through; ``hits`` is changed.
+
+    A ray goes on whole or not at all, by a number of its own, so that rows are counts.
+    """
+    mesh, tree = tracing.built
+    count = len(directions) // len(shifts)
+    numbers = (shifts[:, :1] + np.arange(begin, begin + count, dtype=np.uint64)).reshape(-1)
+    rays = np.flatnonzero(hits.face >= 0)
+    while len(rays):
+        numbers[rays] = mixed(numbers[rays] + WEYL)
+        chance = (numbers[rays] >> np.uint64(11)).astype(np.float64) * 2.0**-53
+        # rule: transmitted-share
+        rays = rays[chance < tracing.surfaces.transmittance[hits.face[rays]]]
+        if len(rays) == 0:
+            return
+        here = hits[rays]
+        leaving = check_leaving(here.through(), None, here.face.shape, len(mesh.faces))
+        start = RayBatch(np.ascontiguousarray(here.points), directions[rays], *_EVERYWHERE)
+        yield from _go_on(tracing, hits, rays, offset_origins(start, leaving, mesh, tree.scale, 1))
+        rays = rays[hits.face[rays] >= 0]
+
+
+def _go_on(tracing: Tracing, hits: Hits, rays: Integers, batch: RayBatch) -> Iterator[None]:
+    """Replace the hits of some rays by those of a batch."""
+    further = yield from _closest(tracing, batch)
+    for old, new in zip(_columns(hits), _columns(further), strict=True):
+        old[rays] = new
+
+
+def _columns(hits: Hits) -> tuple[NDArray[np.generic], ...]:
+    side, pile = hits.side, hits._pile
+    assert side is not None and pile is not None
+    return hits.t, hits.face, hits.u, hits.v, side, pile
+
+
+def _targets_at(surfaces: Surfaces, hits: Hits) -> Integers:
+    """The surface that each ray ends on; beyond them the sky, and backs that do not receive."""
+    number, side = surfaces.number, hits.side
+    assert side is not None
+    targets = surfaces.of_face[hits.face]
+    # rule: sky-of-row
+    targets[hits.face < 0] = number + SKY
+    # rule: backs-of-faces
+    targets[(side < 0) & ~surfaces.both[hits.face]] = number + BACK
+    return targets

@@ -1,0 +1,96 @@
+"""The surfaces between which view factors are computed: faces or groups of them, and the sides that they send from."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.arguments.arrays import real_argument
+from renderer.arguments.types import ArrayLike
+from renderer.errors import expect
+from renderer.mesh.mesh import Mesh
+from renderer.trace.batch import whole_numbers
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+class Surfaces(NamedTuple):
+    """n surfaces of the F faces of a mesh, checked.
+
+    of_face        (F,) int64: the surface that each face belongs to
+    areas          (n,) float64: the area that sends, of both sides where both send, times what is not let through
+    weights        (F,) float64: the share of each face in that
+    both           (F,) bool: whether a face sends from both sides
+    transmittance  (F,) float64
+    """
+
+    of_face: Integers
+    areas: Floats
+    weights: Floats
+    both: NDArray[np.bool_]
+    transmittance: Floats
+
+    @property
+    def number(self) -> int:
+        """How many surfaces there are."""
+        return len(self.areas)
+
+
+def check_surfaces(mesh: Mesh, groups: ArrayLike | None, sides: str, transmittance: ArrayLike | None) -> Surfaces:
+    """The arguments of ``view_factors``, checked. Raises ``ValueError`` naming argument and row."""
+    count = len(mesh.faces)
+    expect(count > 0, "octree", "a mesh with faces", "none")
+    shares = check_transmittance(transmittance, count)
+    known = isinstance(sides, str) and sides in ("front", "both")
+    expect(known, "sides", "'front' or 'both'", repr(sides))
+    of_face = np.arange(count) if groups is None else _check_groups(groups, count)
+    both = (shares > 0.0) | (sides == "both")
+    # rule: area-that-sends
+    weights = areas_of(mesh) * np.where(both, 2.0, 1.0) * (1.0 - shares)
+    areas = np.bincount(of_face, weights)
+    empty = ~(areas > 0.0)
+    if empty.any():
+        row = int(empty.argmax())
+        faces = np.flatnonzero(of_face == row)[:4].tolist()
+        expect(False, "groups", "surfaces with an area", f"none in surface {row}, of the faces {faces}")
+    expect(bool(np.isfinite(areas).all()), "octree", "areas below the largest float64", "larger ones")
+    return Surfaces(of_face, areas, weights, both, shares)
+
+
+def check_transmittance(transmittance: ArrayLike | None, count: int) -> Floats:
+    """The share of a ray that each face lets through, (F,), from 0 to 1; zeros for None."""
+    if transmittance is None:
+        return np.zeros(count)
+    given = real_argument("transmittance", transmittance)
+    expect(given.shape == (count,), "transmittance", f"shape ({count},), one a face", f"shape {given.shape}")
+    shares: Floats = np.array(given, np.float64)
+    bad = ~((shares >= 0.0) & (shares <= 1.0))
+    if bad.any():
+        row = int(bad.argmax())
+        expect(False, "transmittance", "numbers from 0 to 1", f"{shares[row]} in row {row}")
+    return shares
+
+
+def areas_of(mesh: Mesh) -> Floats:
+    """The areas of faces (F,), in the mesh's unit."""
+    corners = mesh.vertices[mesh.faces]
+    with np.errstate(over="ignore", invalid="ignore"):
+        return 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+
+
+def _check_groups(groups: ArrayLike, count: int) -> Integers:
+    given: Integers = np.array(whole_numbers("groups", real_argument("groups", groups), (count,)), np.int64)
+    below = given < 0
+    if below.any():
+        row = int(below.argmax())
+        expect(False, "groups", "surfaces from 0 up for all faces", f"{given[row]} in row {row}")
+    most = int(given.max())
+    present = np.zeros(min(most, count) + 1, np.bool_)
+    present[given[given < len(present)]] = True
+    if most >= count or not present.all():
+        missing = int((~present).argmax()) if not present.all() else count
+        expect(False, "groups", "each surface from 0 to the largest", f"no face of surface {missing}")
+    return given

@@ -1,0 +1,47 @@
+"""What the rays of a row hit: each target once, how often, and with which error."""
+
+import math
+
+from renderer.jit.decorators import kernel
+from renderer.studies.factors.aim import REPLICATES
+
+# A count is a whole number: no entry is known better than half a ray.
+_HALF = 0.5
+
+
+@kernel
+def tally_rows(keys, known_first, known, most, rtol, targets, counts, errors, lengths, unfinished):
+    """Count the hits of some rows.
+
+    keys         (rows, n) int64, sorted: target * REPLICATES + the number of the sequence that the ray belongs to
+    known_first  (rows + 1,) int64, known (...) int64: the targets of each row, sorted, that need no rays
+    most         (rows,) float64: the largest entry of each row that needs no rays
+    rtol         as of ``view_factors``
+    targets, counts, errors
+                 (rows * n,): the targets of each row that do, from row * n on; how many rays hit them; the standard
+                 error of that number over n
+    lengths      (rows,) int64: how many targets they are
+    unfinished   (rows,) bool: whether an error is larger than rtol times the largest entry
+    """
+    rays = keys.shape[1]
+    for row in range(len(keys)):
+        at, begin, length, largest, worst = known_first[row], 0, 0, most[row], 0.0
+        while begin < rays:
+            target, end, squares = keys[row, begin] // REPLICATES, begin, 0.0
+            while end < rays and keys[row, end] // REPLICATES == target:
+                run = end
+                while end < rays and keys[row, end] == keys[row, run]:
+                    end += 1
+                squares += float(end - run) ** 2
+            count = end - begin
+            while at < known_first[row + 1] and known[at] < target:
+                at += 1
+            if at == known_first[row + 1] or known[at] != target:
+                # rule: error-of-replicates
+                spread = (squares - float(count) ** 2 / REPLICATES) * REPLICATES / (REPLICATES - 1)
+                error = math.sqrt(max(spread, _HALF * _HALF)) / rays
+                i = row * rays + length
+                targets[i], counts[i], errors[i] = target, count, error
+                largest, worst, length = max(largest, count / rays), max(worst, error), length + 1
+            begin = end
+        lengths[row], unfinished[row] = length, worst > rtol * largest

@@ -1,0 +1,197 @@
+"""View factors by closed forms and laws; groups, sides, what is let through, and points."""
+
+import numpy as np
+import pytest
+from cases import cases
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from renderer import BruteForce, Octree
+from renderer.mesh.shapes import box, grid, icosphere
+from renderer.studies import view_factors, view_factors_from
+
+pytest.importorskip("scipy")
+pytestmark = pytest.mark.judges(
+    "studies.view_factors", "studies.view_factors_from", "studies.ViewFactors", "studies.PointFactors"
+)
+
+# Of a unit cube: a wall to the one opposite (Howell C-11) and to one beside it (C-14).
+OPPOSITE, BESIDE = 0.19982489569838746, 0.20004377607540316
+WALLS = np.repeat(np.arange(6), 2)
+
+
+def inward(mesh):
+    """The mesh seen from within."""
+    return Octree(mesh.vertices, mesh.faces[:, ::-1])
+
+
+def joined(*meshes):
+    """Meshes as one, without welding."""
+    begins = np.cumsum([0] + [len(vertices) for vertices, _ in meshes])
+    faces = [faces + begin for (_, faces), begin in zip(meshes, begins, strict=False)]
+    return np.concatenate([vertices for vertices, _ in meshes]), np.concatenate(faces)
+
+
+def room(cut, column=True):
+    """A unit room whose walls are cut into 2 cut^2 faces each, with a column in it."""
+    parts = []
+    for axis in range(3):
+        for side in (0.0, 1.0):
+            wall = grid(cut, cut)
+            square = wall.vertices[:, [0, 2]] + 0.5
+            vertices = np.insert(square, axis, side, axis=1)
+            centre, (a, b, c) = np.full(3, 0.5), vertices[wall.faces[0]]
+            turned = np.dot(np.cross(b - a, c - a), centre - a) < 0
+            parts.append((vertices, wall.faces[:, ::-1] if turned else wall.faces))
+    if column:
+        inner = box((0.4, 0.45, 0.2), (0.6, 0.55, 0.8))
+        parts.append((inner.vertices, inner.faces))
+    return joined(*parts)
+
+
+def check_laws(found):
+    """Reciprocity exactly, no negative entry, and sums of 1."""
+    exchange = found.exchange.toarray()
+    np.testing.assert_array_equal(exchange, exchange.T)
+    assert exchange.min() >= 0.0 and found.sky.min() >= 0.0 and found.backs.min() >= 0.0
+    np.testing.assert_allclose(found.matrix.sum(axis=1) + found.sky + found.backs, 1.0, rtol=0, atol=1e-12)
+
+
+def test_the_walls_of_a_cube_are_exact():
+    found = view_factors(inward(box()), WALLS)
+    check_laws(found)
+    matrix = found.matrix.toarray()
+    assert (np.diag(matrix) == 0.0).all() and (found.sky == 0.0).all() and (found.rays == 0).all()
+    opposite = np.isclose(matrix, OPPOSITE, rtol=0, atol=1e-9)
+    beside = np.isclose(matrix, BESIDE, rtol=0, atol=1e-9)
+    assert (opposite.sum(axis=1) == 1).all() and (beside.sum(axis=1) == 4).all()
+
+
+@cases("searched", [Octree, BruteForce])
+@cases("column", [False, True])
+def test_laws_hold_by_rays(searched, column):
+    vertices, faces = room(3, column)
+    check_laws(view_factors(searched(vertices, faces), rtol=0.3, max_rays=512))
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_laws_hold_in_any_scene(seed):
+    rng = np.random.default_rng(seed)
+    vertices = rng.normal(size=(20, 1, 3)) + 0.5 * rng.normal(size=(20, 3, 3))
+    octree = Octree(vertices.reshape(-1, 3), np.arange(60).reshape(-1, 3))
+    groups = rng.integers(0, 4, 20)
+    groups[:4] = np.arange(4)
+    shares = np.where(rng.random(20) < 0.3, rng.random(20), 0.0)
+    check_laws(view_factors(octree, groups, sides="both", transmittance=shares, max_rays=1024))
+
+
+def test_the_bits_are_the_same_for_any_number_of_threads():
+    octree = Octree(*room(3))
+    one, other = (view_factors(octree, threads=threads, max_rays=1024) for threads in (1, 5))
+    for name in ("indptr", "indices", "data"):
+        np.testing.assert_array_equal(getattr(one.exchange, name), getattr(other.exchange, name))
+    np.testing.assert_array_equal(one.rays, other.rays)
+
+
+def test_a_ball_in_a_ball():
+    """The inner one sees nothing but the outer; of what the outer sends, the share of the areas arrives at the inner.
+
+    Both are polyhedra of the same shape, so the formula of spheres, F = (r / R)^2, holds for their areas.
+    """
+    small, large = icosphere(3), icosphere(3)
+    vertices, faces = joined((0.4 * small.vertices, small.faces), (large.vertices, large.faces[:, ::-1]))
+    count = len(small.faces)
+    found = view_factors(Octree(vertices, faces), np.repeat([0, 1], count), rtol=0.002, max_rays=1 << 18)
+    check_laws(found)
+    matrix, errors = found.matrix.toarray(), found.errors.toarray()
+    assert matrix[0].tolist() == [0.0, 1.0]
+    assert abs(matrix[1, 0] - 0.16) < 4.0 * errors[1, 0] + 1e-9
+
+
+def test_a_sphere_sees_itself_by_the_share_of_its_area():
+    """From any face of a sphere seen from within, each part of it has the share of its area (Howell C-120).
+
+    The faces of the polyhedron are 1/32 of a radius off the sphere at most, which errs by as much.
+    """
+    mesh = icosphere(2)
+    found = view_factors(inward(mesh), rtol=0.02)
+    check_laws(found)
+    shares = found.areas / found.areas.sum()
+    far = ~np.isin(mesh.faces, mesh.faces[0]).any(axis=1)
+    np.testing.assert_allclose(found.matrix.toarray()[0, far], shares[far], rtol=0.15)
+
+
+@cases("share", [0.0, 0.25, 0.75])
+def test_a_screen_lets_its_share_through(share):
+    """Half way between two squares hangs a screen, larger than any line between them needs."""
+    plates = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    wide = 4.0 * (plates - [0.5, 0.5, 0]) + [0.5, 0.5, 0.5]
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    vertices, faces = joined((plates, faces), (plates + [0, 0, 1], faces[:, ::-1]), (wide, faces))
+    groups = np.repeat([0, 1, 2], 2)
+    found = view_factors(
+        Octree(vertices, faces), groups, transmittance=np.where(groups == 2, share, 0.0), rtol=0.01, sides="both"
+    )
+    check_laws(found)
+    # Of both sides of a plate one looks at the screen.
+    assert found.matrix[0, 1] == pytest.approx(0.5 * share * OPPOSITE, abs=4.0 * found.errors[0, 1] + 1e-12)
+    assert found.areas.tolist() == [2.0, 2.0, 2.0 * 16.0 * (1.0 - share)]
+
+
+def test_backs_are_counted_apart_with_a_warning():
+    """Two plates face each other; one of them is turned away."""
+    plates = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    vertices, faces = joined((plates, faces), (plates + [0, 0, 1], faces))
+    octree, groups = Octree(vertices, faces), [0, 0, 1, 1]
+    with pytest.warns(UserWarning, match="surface 0 most"):
+        found = view_factors(octree, groups)
+    check_laws(found)
+    assert found.exchange.nnz == 0
+    assert found.backs == pytest.approx([OPPOSITE, 0.0], abs=0.01)
+
+
+def test_points_see_the_corner_of_a_room_by_lamberts_formula():
+    """A corner of a unit square seen from a point below it, at right angles to its plane (Howell B-3)."""
+    octree = inward(box())
+    # From the middle of the floor, the ceiling is four squares of side 1/2, each at the distance 1.
+    a = 0.5
+    root = np.sqrt(1.0 + a * a)
+    corner = (a / root * np.arctan(a / root)) / np.pi
+    found = view_factors_from(octree, [[0.5, 0.5, 0.0], [0.5, 0.5, 1e-9]], [0, 0, 1], WALLS, rtol=1e-3)
+    ceiling = int(np.flatnonzero(np.isclose(found.matrix.toarray()[0], 4.0 * corner, atol=0.02))[0])
+    for k in range(2):
+        assert found.matrix[k, ceiling] == pytest.approx(4.0 * corner, abs=4.0 * found.errors[k, ceiling])
+    assert (found.sky == 0.0).all()
+    np.testing.assert_allclose(found.matrix.sum(axis=1), 1.0, atol=1e-12)
+
+
+@cases(
+    ("arguments", "message"),
+    [
+        ({"groups": [0] * 11}, "groups: expected"),
+        ({"groups": [-1] + [0] * 11}, "groups: expected surfaces from 0 up for all faces, got -1 in row 0"),
+        ({"groups": [0] * 11 + [2]}, "groups: expected each surface from 0 to the largest, got no face of surface 1"),
+        ({"groups": [0] * 11 + [99]}, "groups: expected each surface from 0 to the largest, got no face of surface 1"),
+        ({"groups": [0.5] * 12}, "groups: expected"),
+        ({"sides": "back"}, "sides: expected 'front' or 'both', got 'back'"),
+        ({"transmittance": [0.5]}, "transmittance: expected shape \\(12,\\), one a face"),
+        ({"transmittance": [0.5] * 11 + [-0.1]}, "transmittance: expected numbers from 0 to 1, got -0.1 in row 11"),
+        ({"transmittance": [np.nan] * 12}, "transmittance: expected numbers from 0 to 1, got nan in row 0"),
+        ({"transmittance": [0.0] * 11 + [1.0]}, "groups: expected surfaces with an area, got none in surface 11"),
+        ({"rtol": 0.0}, "rtol: expected a number above 0, got 0.0"),
+        ({"rtol": np.nan}, "rtol: expected a number above 0, got nan"),
+        ({"max_rays": 255}, "max_rays: expected"),
+    ],
+)
+def test_bad_input_is_named(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        view_factors(Octree.from_mesh(box()), **arguments)
+
+
+def test_a_face_without_area_is_named():
+    octree = Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 1, 1]])
+    with pytest.raises(ValueError, match=r"groups: expected surfaces with an area, got none in surface 1, .*\[1\]"):
+        view_factors(octree)
+    assert view_factors(octree, [0, 0]).areas.tolist() == [0.5]
