@@ -1,5 +1,6 @@
 """The section on studies: skies, sun, occlusion and view factors against closed forms, Embree and exact bits."""
 
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,20 +26,30 @@ PICTURE = "studies-town.png"
 
 def steps(job: Job) -> int:
     """Number of calls of ``job.step``: one for each closed form, mesh and check, one for the slope, one to draw."""
-    return len(_tasks(job))
+    return len(_tasks(job)) + len(factors.tasks(job.quick))
 
 
 def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
     """Ask all questions and draw a picture; returns a record for JSON and the gates."""
-    found = iter(job.each(_tasks(job)))
+    found = iter(job.each([*_tasks(job), *factors.tasks(job.quick)]))
+    record, gates = _judged(found)
+    exchanged = factors.record(found)
+    return record | {"factors": exchanged}, [*gates, *factors.gates(exchanged)]
+
+
+def without_factors(job: Job) -> list[Gate]:
+    """The gates of all checks but those of view factors."""
+    return _judged(iter(job.each(_tasks(job))))[1]
+
+
+def _judged(found: Iterator[dict[str, Any]]) -> tuple[dict[str, Any], list[Gate]]:
+    """The record and the gates of what the tasks of this module found, in their order."""
     shares = [next(found) for _ in forms.forms()]
     slopes = next(found)["curves"]
     bit_rows = [next(found) for _ in bodies.bodies()]
     corner_rows = [next(found) for _ in corners.CHECKS]
     held = [next(found) for _ in holds.CHECKS]
     drawn = next(found)
-    exchanged = factors.record(found)
-    held += exchanged.pop("laws")
     gates = [
         *(Gate("studies", row["subject"], "error over its bound", row["share_of_bound"], "at most", 1.0, _BOUND,
                (f"studies.{row['study']}",))
@@ -53,11 +64,9 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
                "at most", 0.0, _NAMED, ("studies.sky_view_factor",)) for row in corner_rows),
         *(Gate("studies", row["subject"], "wrong answers", float(row["wrong"]), "at most", 0.0, _HOLDS, row["judged"])
           for row in held),
-        *factors.gates(exchanged),
     ]  # fmt: skip
     record = {"forms": shares, "slopes": slopes, "bits": bit_rows, "corners": corner_rows, "holds": held,
-              "picture": drawn, "factors": exchanged, "patches": list(forms.PATCHES),
-              "costs": dict.fromkeys(JUDGES)}  # fmt: skip
+              "picture": drawn, "patches": list(forms.PATCHES), "costs": dict.fromkeys(JUDGES)}  # fmt: skip
     return record, gates
 
 
@@ -73,5 +82,4 @@ def _tasks(job: Job) -> list[Task]:
           for index, (name, kind) in enumerate(corners.CHECKS)),
         *(Task(f"studies: {name}", partial(holds.check, name)) for name in holds.CHECKS),
         Task("studies: picture", partial(picture.write, Path(job.folder) / PICTURE)),
-        *factors.tasks(job.quick),
     ]  # fmt: skip

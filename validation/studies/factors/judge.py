@@ -5,7 +5,7 @@ from functools import partial
 from typing import Any
 
 from validation.gates import Gate
-from validation.job import Task
+from validation.job import Job, Task
 from validation.studies.factors import embree, errors, forms, laws, points
 
 _FORM = "eight standard errors, as eight sequences state them; an exact entry: 1e-9 of the area"
@@ -13,8 +13,14 @@ _ASKED = "rows have rays until each error is at most rtol of the largest entry"
 _APART = "chance is beyond five standard errors once in two million"
 _SLOPE = "random rays give -1/2; the mean of some dozen errors moves the slope by 0.05 at most"
 _HONEST = "a stated error is that of eight sequences: squares vary by a half, and their mean over entries by less"
+_LAW = "exact: it must hold for every answer"
 _MATRIX = ("studies.view_factors",)
 _POINTS = ("studies.view_factors_from",)
+
+
+def run(job: Job) -> list[Gate]:
+    """The gates of all checks."""
+    return gates(record(iter(job.each(tasks(job.quick)))))
 
 
 def tasks(quick: bool) -> list[Task]:
@@ -40,20 +46,21 @@ def record(found: Iterator[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
 
 
 def gates(found: dict[str, list[dict[str, Any]]]) -> list[Gate]:
-    """The gates on a record, but for those on laws, which are like other invariants."""
+    """The gates on a record."""
     return [
-        *(_gate(row, "view factors over their allowed error", "share_of_allowed", 1.0, _FORM) for row in found["forms"]),
-        *(_gate(row, "view factors over their allowed error", "share_of_allowed", 1.0, _FORM, _POINTS)
+        *(_gate(row, "error over what is allowed", "share_of_allowed", 1.0, _FORM) for row in found["forms"]),
+        *(_gate(row, "error over what is allowed", "share_of_allowed", 1.0, _FORM, _POINTS)
           for row in found["points"]),
         *(_gate(row, "stated error over that requested", "share_of_asked", 1.0, _ASKED) for row in found["forms"]),
         *(_gate(row, "standard errors from Embree's rays", "apart", embree.ERRORS, _APART) for row in found["embree"]),
         *(_gate(row, "slope of the error", "slope", errors.SLOPE, _SLOPE) for row in found["errors"]),
         *(_gate(row, "mean square of true over stated error", "ratio", errors.HONEST, _HONEST)
           for row in found["errors"]),
+        *(_gate(row, "wrong answers", "wrong", 0.0, _LAW, row["judged"]) for row in found["laws"]),
     ]  # fmt: skip
 
 
 def _gate(
     row: dict[str, Any], quantity: str, key: str, most: float, reason: str, judged: tuple[str, ...] = _MATRIX
 ) -> Gate:
-    return Gate("studies", row["subject"], quantity, row[key], "at most", most, reason, judged)
+    return Gate("studies", row["subject"], quantity, float(row[key]), "at most", most, reason, judged)

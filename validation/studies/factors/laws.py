@@ -1,5 +1,6 @@
 """Exact laws of view factors: each check counts the answers that break one."""
 
+import warnings
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -7,8 +8,9 @@ import numpy as np
 
 from renderer.octree import Octree
 from renderer.studies import ViewFactors, view_factors
+from validation.oracle.view_factors.rectangles import Span, parallel
 from validation.studies.factors.forms import ERRORS, FORMS
-from validation.studies.factors.rooms import ROOMS, Room, room_with_column, two_rooms
+from validation.studies.factors.rooms import ROOMS, Plate, Room, of_plates, room_with_column, two_rooms
 
 Asked = tuple[int, int]
 # Sums of some hundred shares, each rounded.
@@ -73,6 +75,18 @@ def closed_rooms_have_no_sky() -> Asked:
     return _count(np.concatenate([part.sky == 0.0 for part in found] + [part.backs == 0.0 for part in found]))
 
 
+def backs_do_not_receive() -> Asked:
+    """Of what a plate sends to the back of another nothing is received, and the rest is that of plates face to face."""
+    flat = (Span(0.0, 1.0), Span(0.0, 1.0))
+    room = of_plates([Plate(2, 1, 0.0, flat), Plate(2, 1, 1.0, flat)])
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        found = _found(room, rtol=0.01, max_rays=1 << 16)
+    known, rays = parallel(1.0, 1.0, 1.0), int(found.rays[0])
+    close = abs(float(found.backs[0]) - known) <= ERRORS * np.sqrt(known * (1.0 - known) / rays)
+    return _count([found.exchange.nnz == 0, close, found.backs[1] == 0.0, found.sky[1] == 1.0, len(said) == 1])
+
+
 def a_column_only_hides() -> Asked:
     """No two walls exchange more with a column in the room than without it."""
     rooms = room_with_column(False), room_with_column(True)
@@ -133,6 +147,7 @@ CHECKS = {
     "view factors are shares": Check(shares_are_shares, ("studies.view_factors",)),
     "planes and themselves": Check(planes_do_not_see_themselves, ("studies.view_factors",)),
     "closed rooms": Check(closed_rooms_have_no_sky, ("studies.view_factors",)),
+    "backs of plates": Check(backs_do_not_receive, ("studies.view_factors",)),
     "a column in a room": Check(a_column_only_hides, ("studies.view_factors",)),
     "two rooms": Check(walls_between_rooms_hide_all, ("studies.view_factors",)),
     "view factors by any threads": Check(threads_change_nothing, ("studies.view_factors",)),
