@@ -11,15 +11,17 @@ from numpy.typing import NDArray
 from renderer.numerics.mixing import mixed
 from renderer.queryable import Built
 from renderer.results.hits import Hits
-from renderer.studies.factors.aim import REPLICATES, WEYL, Senders, aim_rows, shifts_of
+from renderer.studies.factors.aim import WEYL, Senders, aim_rows, shifts_of
 from renderer.studies.factors.surfaces import Surfaces
-from renderer.studies.factors.tally import tally_rows
+from renderer.studies.factors.tally import tally_rows, write_keys
 from renderer.system.terminal import progress_bar
 from renderer.system.threads import for_chunks
-from renderer.trace.batch import CHUNK, Leaving, RayBatch, offset_origins, reject
+from renderer.trace.batch import CHUNK, Leaving, RayBatch, make_starts, offset_origins, reject
 from renderer.trace.closest import find_range
 from renderer.trace.leaving import check_leaving
 from renderer.trace.rays import HitArrays
+from renderer.trace.spawn import offset_from_faces
+from renderer.trace.starts.record import HEAD, ROW
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -27,8 +29,6 @@ Integers = NDArray[np.int64]
 # The rays of a row at first: the least that tells a share of a hundredth from one of a fiftieth.
 FIRST_RAYS = 256
 _ROWS = CHUNK // FIRST_RAYS
-# Targets after the last surface.
-SKY, BACK = 0, 1
 _EVERYWHERE = (np.zeros(1), np.full(1, np.inf))
 
 
@@ -90,14 +90,15 @@ def nothing_known(rows: int) -> Known:
 
 def trace_rows(tracing: Tracing, rows: Integers, known: Known) -> RowHits:
     """Trace the rays of some rows; ``known`` has all rows."""
-    parts: list[tuple[Integers, RowHits]] = []
+    none = np.empty(0, np.int64)
+    parts = [(none, RowHits(np.zeros(1, np.int64), none, none, np.empty(0), none))]
     with progress_bar(len(rows), "surface", tracing.progress) as update:
 
         def trace(begin: int, end: int) -> Iterator[None]:
             yield from _trace_until(tracing, begin + np.arange(end - begin), rows, known, parts)
 
         for_chunks(trace, len(rows), _ROWS, tracing.threads, update)
-    return _in_order(parts, len(rows))
+    return _in_order(parts)
 
 
 def _trace_until(
@@ -132,14 +133,13 @@ def _tally(keys: Integers, rows: Integers, known: Known, rtol: float, last: bool
     return RowHits(ends, targets[used], counts[used], errors[used], np.full(len(ends) - 1, rays)), unfinished
 
 
-def _in_order(parts: list[tuple[Integers, RowHits]], rows: int) -> RowHits:
-    """The hits of rows at their places, from records of some rows each."""
-    places = np.concatenate([part[0] for part in parts]) if parts else np.empty(0, np.int64)
-    order = np.argsort(places, kind="stable")
-    begins = np.concatenate([part.first[:-1] for _, part in parts]) if parts else places
+def _in_order(parts: list[tuple[Integers, RowHits]]) -> RowHits:
+    """The hits of rows in the order of their places, from records of some rows each."""
+    order = np.argsort(np.concatenate([own for own, _ in parts]), kind="stable")
+    begins = np.concatenate([part.first[:-1] for _, part in parts])
     sizes = np.array([len(part.targets) for _, part in parts], np.int64)
     begins = begins + np.repeat(np.cumsum(sizes) - sizes, [len(own) for own, _ in parts])
-    lengths = np.concatenate([np.diff(part.first) for _, part in parts]) if parts else places
+    lengths = np.concatenate([np.diff(part.first) for _, part in parts])
     begins, lengths = begins[order], lengths[order]
     first = np.concatenate([[0], np.cumsum(lengths)])
     entries = np.arange(first[-1]) + np.repeat(begins - first[:-1], lengths)
@@ -155,26 +155,28 @@ def _keys_of(tracing: Tracing, rows: Integers, begin: int, count: int) -> Genera
     for top in range(0, len(rows), height):
         for left in range(0, count, width):
             own, some = slice(top, top + height), min(width, count - left)
-            targets = yield from _targets_of(tracing, rows[own], shifts[own], begin + left, some)
-            sequence = (begin + left + np.arange(some)) % REPLICATES
-            keys[own, left : left + some] = targets.reshape(-1, some) * REPLICATES + sequence
+            hits = yield from _hits_of(tracing, rows[own], shifts[own], begin + left, some)
+            write_keys(hits.face, hits.side, tracing.surfaces.of_face, tracing.surfaces.both,
+                       tracing.surfaces.number, begin + left, keys[own, left : left + some])  # fmt: skip
     return keys
 
 
-def _targets_of(
+def _hits_of(
     tracing: Tracing, rows: Integers, shifts: NDArray[np.uint64], begin: int, count: int
-) -> Generator[None, None, Integers]:
-    """The targets of some rays of some rows, one row after the other."""
+) -> Generator[None, None, Hits]:
+    """The hits of some rays of some rows, one row after the other."""
     total, (mesh, tree) = len(rows) * count, tracing.built
-    origins, directions = np.empty((2, total, 3))
+    origins, moved, directions = np.empty((3, total, 3))
     faces, codes = np.empty((2, total), np.int64)
     aim_rows(*tracing.senders, shifts, rows, begin, count, origins, directions, faces, codes)
-    rays = RayBatch(origins, directions, *_EVERYWHERE)
-    batch = offset_origins(rays, Leaving(faces, codes, np.empty((0, 3))), mesh, tree.scale, 1)
-    hits = yield from _closest(tracing, batch)
+    starts = make_starts(total, mesh)
+    leaving, own = Leaving(faces, codes, np.empty((0, 3))), starts[HEAD:].view(np.float64).reshape(total, ROW)
+    # None is too far from its face: it was placed there.
+    offset_from_faces(mesh.vertices, mesh.faces, origins, directions, leaving, moved, own, 0, total, tree.scale)
+    hits = yield from _closest(tracing, RayBatch(moved, directions, *_EVERYWHERE, starts))
     if tracing.surfaces.transmittance.any():
         yield from _pass_through(tracing, hits, directions, shifts, begin)
-    return _targets_at(tracing.surfaces, hits)
+    return hits
 
 
 def _closest(tracing: Tracing, rays: RayBatch) -> Generator[None, None, Hits]:
@@ -224,15 +226,3 @@ def _columns(hits: Hits) -> tuple[NDArray[np.generic], ...]:
     side, pile = hits.side, hits._pile
     assert side is not None and pile is not None
     return hits.t, hits.face, hits.u, hits.v, side, pile
-
-
-def _targets_at(surfaces: Surfaces, hits: Hits) -> Integers:
-    """The surface that each ray ends on; beyond them the sky, and backs that do not receive."""
-    number, side = surfaces.number, hits.side
-    assert side is not None
-    targets = surfaces.of_face[hits.face]
-    # rule: sky-of-row
-    targets[hits.face < 0] = number + SKY
-    # rule: backs-of-faces
-    targets[(side < 0) & ~surfaces.both[hits.face]] = number + BACK
-    return targets

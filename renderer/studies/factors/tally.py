@@ -5,8 +5,30 @@ import math
 from renderer.jit.decorators import kernel
 from renderer.studies.factors.aim import REPLICATES
 
+# Targets after the last surface.
+SKY, BACK = 0, 1
 # A count is a whole number: no entry is known better than half a ray.
 _HALF = 0.5
+
+
+@kernel
+def write_keys(faces, sides, of_face, both, number, begin, keys):
+    """Write the keys of ``tally_rows`` for the rays from ``begin`` on of some rows.
+
+    faces, sides   (rows * n,) int64: what each ray hit, -1 for nothing, and from which side
+    of_face, both  as of ``Surfaces``; ``number`` of them
+    keys           (rows, n) int64
+    """
+    rows, count = keys.shape
+    for row in range(rows):
+        for k in range(count):
+            face = faces[row * count + k]
+            # rule: sky-of-row
+            target = number + SKY
+            if face >= 0:
+                # rule: backs-of-faces
+                target = of_face[face] if sides[row * count + k] > 0 or both[face] else number + BACK
+            keys[row, k] = target * REPLICATES + (begin + k) % REPLICATES
 
 
 @kernel
