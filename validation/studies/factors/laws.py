@@ -35,7 +35,7 @@ def _each() -> Iterator[ViewFactors]:
         yield _found(room)
         yield _found(room._replace(groups=np.arange(len(room.groups))))
         yield _found(room, sides="both")
-        yield _found(room, transmittance=np.where(room.groups % 3 == 1, 0.25, 0.0))
+        yield _found(room, sides="both", transmittance=np.where(room.groups % 3 == 1, 0.25, 0.0))
     for form in (build() for build in FORMS.values()):
         yield _found(form.room, **form.options)
 
