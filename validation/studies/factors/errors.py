@@ -1,10 +1,12 @@
 """How fast errors of view factors fall with the number of rays, and whether they are as large as is stated."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.studies import view_factors
 from validation.error_curves import slope
@@ -25,25 +27,33 @@ HONEST = 1.75
 
 
 def _streets() -> list[Form]:
-    """One street; a surface with another number has other rays."""
-    form, rng = street_with_block(), np.random.default_rng(_SEED)
-    found = [form]
-    for _ in range(3):
-        number = rng.permutation(int(form.room.groups.max()) + 1)
-        entries = [entry._replace(one=int(number[entry.one]), other=int(number[entry.other])) for entry in form.entries]
-        room = form.room._replace(groups=number[form.room.groups])
-        found.append(Form(form.name, form.source, room, entries))
-    return found
+    """One street, turned: its surfaces have other frames, in which they send the same rays."""
+    return _turned([street_with_block()] * 4)
 
 
 def _discs() -> list[Form]:
     """Third discs of several radii at several heights."""
-    return [disc_between(*between) for between in ((0.3, 0.2), (0.5, 0.35), (0.7, 0.5), (0.4, 0.65), (0.6, 0.8))]
+    places = ((0.3, 0.2), (0.5, 0.35), (0.7, 0.5), (0.4, 0.65), (0.6, 0.8))
+    return _turned([disc_between(*place) for place in places])
 
 
 def _sheets() -> list[Form]:
     """Several shares."""
-    return [sheets(a, b) for a in (0.15, 0.4, 0.6, 0.85) for b in (0.25, 0.5, 0.75)]
+    return _turned([sheets(a, b) for a in (0.15, 0.4, 0.6, 0.85) for b in (0.25, 0.5, 0.75)])
+
+
+def _turned(forms: list[Form]) -> list[Form]:
+    """Each form turned at random, and its faces begun at a corner at random."""
+    rng = np.random.default_rng(_SEED)
+    found = []
+    for form in forms:
+        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        turn *= np.linalg.det(turn)
+        first = rng.integers(0, 3, (len(form.room.mesh.faces), 1))
+        faces = np.take_along_axis(form.room.mesh.faces, (first + np.arange(3)) % 3, axis=1)
+        room = form.room._replace(mesh=Mesh(form.room.mesh.vertices @ turn, faces))
+        found.append(replace(form, room=room))
+    return found
 
 
 FORMS: dict[str, Callable[[], list[Form]]] = {
