@@ -75,8 +75,9 @@ class TestRooms:
 def test_closed_forms_hold_and_see_what_is_more_than_allowed(monkeypatch, name):
     row = forms.check(name, True)
     assert row["share_of_allowed"] <= 1.0 and row["share_of_asked"] <= 1.0
-    # What is exact may err by 1e-9 of the area; what is not, by eight errors.
-    gain = 1.0 + (1e-7 if row["stated"] == 0.0 else 0.5)
+    # What is exact may err by 1e-9 of the area; what is not, by eight errors, and what is round has two bounds.
+    exact = row["stated"] == 0.0 and all(entry.low == entry.high for entry in forms.FORMS[name]().entries)
+    gain = 1.0 + (1e-7 if exact else 0.5)
     wrong(forms, monkeypatch, lambda found: scaled(found, gain))
     assert forms.check(name, True)["share_of_allowed"] > 1.0
 
