@@ -10,7 +10,7 @@ from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.studies import view_factors
 from validation.error_curves import slope
-from validation.studies.factors.forms import Form, disc_between, sheets, street_with_block
+from validation.studies.factors.forms import Form, sheets, street_with_block
 
 _QUICK = tuple(1 << k for k in range(8, 15, 2))
 _FULL = tuple(1 << k for k in range(8, 17, 2))
@@ -30,13 +30,7 @@ WASTE = 0.25
 
 def _streets() -> list[Form]:
     """One street, turned: its surfaces have other frames, in which they send the same rays."""
-    return _turned([street_with_block()] * 4)
-
-
-def _discs() -> list[Form]:
-    """Third discs of several radii at several heights."""
-    places = ((0.3, 0.2), (0.5, 0.35), (0.7, 0.5), (0.4, 0.65), (0.6, 0.8))
-    return _turned([disc_between(*place) for place in places])
+    return _turned([street_with_block()] * 8)
 
 
 def _sheets() -> list[Form]:
@@ -60,7 +54,6 @@ def _turned(forms: list[Form]) -> list[Form]:
 
 FORMS: dict[str, Callable[[], list[Form]]] = {
     "streets with a block": _streets,
-    "discs between two discs": _discs,
     "sheets between two squares": _sheets,
 }
 

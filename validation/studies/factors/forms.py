@@ -24,7 +24,7 @@ ERRORS = 8.0
 UNSEEN = 15.0
 # Of the area: what rounding leaves of an exact exchange, a thousand times the 1e-12 of a contour integral's terms.
 ROUNDING = 1e-9
-# The standard error that rows are asked for.
+# The standard error that rows are asked for, of all their entries together.
 _QUICK, _FULL = 0.005, 0.002
 # Enough for that at any share: rows end when their error is reached.
 _RAYS = 1 << 21
@@ -67,8 +67,9 @@ def check(name: str, quick: bool) -> dict[str, Any]:
         chance = ERRORS * float(stated[one, other]) if value else UNSEEN / max(int(found.rays[one]), 1)
         errors.append(beyond)
         shares.append(beyond / (ROUNDING + (chance if found.rays[one] else 0.0)))
-    largest = np.maximum(found.matrix.toarray().max(axis=1), np.maximum(found.sky, found.backs))
-    asked = stated.max(axis=1) / np.where(largest > 0.0, rtol * largest, np.inf)
+    # What two surfaces exchange is the mean of what the rays of both say, the larger one's by its area.
+    ratio = np.minimum(1.0, found.areas[:, None] / found.areas)
+    asked = np.sqrt(((stated * ratio) ** 2).sum(axis=1)) / rtol
     return {"subject": form.name, "source": form.source, "entries": len(form.entries), "error": max(errors),
             "stated": float(max((stated[e.one, e.other] for e in form.entries), default=0.0)),
             "rays": int(found.rays.max()), "share_of_allowed": max(shares),

@@ -9,7 +9,7 @@ from validation.job import Job, Task
 from validation.studies.factors import embree, errors, forms, laws, points
 
 _FORM = "eight standard errors, which chance exceeds once in 11,000; an exact entry: 1e-9 of the area"
-_ASKED = "rows have rays until each error is at most rtol of the largest entry"
+_ASKED = "a row has rays until the root of the sum of its squared errors is at most rtol"
 _APART = "chance is beyond five standard errors once in two million"
 _SLOPE = "random rays give -1/2; chance in the mean of some dozen errors moves that by less than 0.05"
 _HONEST = "a stated error is that of eight sequences: squares vary by a half, and their mean over entries by less"
