@@ -14,9 +14,9 @@ from renderer.system.terminal import progress_bar
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# So many rays take as long as one exact pair of faces.
-_PAIR = 150
-# Of so many pairs of faces, a second of work, all are tried.
+# So many rays take as long as one exact pair of faces: 9 us, beside a quarter of one.
+_PAIR = 40
+# Of so many pairs of faces, half a second of work, all are tried.
 _ALL = 50_000
 
 
