@@ -73,7 +73,7 @@ def check(name: str, quick: bool) -> dict[str, Any]:
 def _errors(form: Form, count: int) -> Any:
     """The error of each entry that has one, and the standard error that is stated: (2, k)."""
     octree = Octree.from_mesh(form.room.mesh)
-    found = view_factors(octree, form.room.groups, rtol=_NEVER, max_rays=count, **form.options)
+    found: Any = view_factors(octree, form.room.groups, rtol=_NEVER, max_rays=count, **form.options)
     exchange, stated, areas = found.exchange.toarray(), found.errors.toarray(), found.areas
     chosen = [entry for entry in form.entries if stated[entry.one, entry.other] > 0.0]
     known = np.array([(entry.low + entry.high) / 2.0 / areas[entry.one] for entry in chosen])

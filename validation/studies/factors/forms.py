@@ -57,7 +57,7 @@ def check(name: str, quick: bool) -> dict[str, Any]:
     form = FORMS[name]()
     rtol = _QUICK if quick else _FULL
     octree = Octree.from_mesh(form.room.mesh)
-    found = view_factors(octree, form.room.groups, rtol=rtol, max_rays=_RAYS, **form.options)
+    found: Any = view_factors(octree, form.room.groups, rtol=rtol, max_rays=_RAYS, **form.options)
     exchange, stated = found.exchange.toarray(), found.errors.toarray()
     errors, shares = [0.0], [0.0]
     for one, other, low, high in form.entries:

@@ -7,6 +7,7 @@ from typing import Any
 from validation.gates import Gate
 from validation.job import Job, Task
 from validation.studies.factors import embree, errors, forms, laws, points
+from validation.studies.factors.rooms import ROOMS
 
 _FORM = "eight standard errors, which chance exceeds once in 11,000; an exact entry: 1e-9 of the area"
 _ASKED = "a row has rays until the root of the sum of its squared errors is at most rtol"
@@ -30,7 +31,7 @@ def tasks(quick: bool) -> list[Task]:
         *(Task(f"view factors: {name}", partial(forms.check, name, quick)) for name in forms.FORMS),
         *(Task(f"view factors: {name}", partial(points.check, name, quick)) for name in points.CHECKS),
         *(Task(f"view factors: {name}", partial(laws.check, name)) for name in laws.CHECKS),
-        *(Task(f"view factors: {name} beside Embree", partial(embree.check, name, quick)) for name in embree.ROOMS),
+        *(Task(f"view factors: {name} beside Embree", partial(embree.check, name, quick)) for name in ROOMS),
         *(Task(f"view factors: errors of {name}", partial(errors.check, name, quick)) for name in errors.FORMS),
     ]
 
@@ -41,7 +42,7 @@ def record(found: Iterator[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
         "forms": [next(found) for _ in forms.FORMS],
         "points": [next(found) for _ in points.CHECKS],
         "laws": [next(found) for _ in laws.CHECKS],
-        "embree": [next(found) for _ in embree.ROOMS],
+        "embree": [next(found) for _ in ROOMS],
         "errors": [next(found) for _ in errors.FORMS],
     }
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.octree import Octree
-from renderer.studies import ViewFactors, view_factors
+from renderer.studies import view_factors
 from validation.oracle.view_factors.rectangles import Span, parallel
 from validation.studies.factors.forms import ERRORS, FORMS
 from validation.studies.factors.rooms import ROOMS, Plate, Room, of_plates, room_with_column, two_rooms
@@ -26,12 +26,12 @@ def _count(same: Any) -> Asked:
     return right.size, int((~right).sum())
 
 
-def _found(room: Room, **options: Any) -> ViewFactors:
+def _found(room: Room, **options: Any) -> Any:
     chosen = {"rtol": _RTOL, "max_rays": _RAYS} | options
     return view_factors(Octree.from_mesh(room.mesh), room.groups, **chosen)
 
 
-def _each() -> Iterator[ViewFactors]:
+def _each() -> Iterator[Any]:
     """Rooms and forms, by surfaces and by faces, with two sides, and with faces that let something through."""
     for room in (build() for build in ROOMS.values()):
         yield _found(room)
