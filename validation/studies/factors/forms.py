@@ -13,9 +13,10 @@ from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
 from renderer.studies import view_factors
 from validation.oracle.view_factors import cylinders, discs, rectangles, spheres
+from validation.oracle.view_factors.rectangles import Span
 from validation.studies.factors import round as shapes
 from validation.studies.factors import street
-from validation.studies.factors.rooms import Plate, Room, Span, between, box_plates, of_plates
+from validation.studies.factors.rooms import Plate, Room, between, box_plates, of_plates
 
 # A standard error is that of eight sequences: by Student's law with seven degrees of freedom, chance is beyond eight
 # of them once in 11,000.
