@@ -1,5 +1,6 @@
-"""The section on studies: sky view factors, hours of sun and occlusion against closed forms, Embree and exact bits."""
+"""The section on studies: skies, sun, occlusion and view factors against closed forms, Embree and exact bits."""
 
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 from validation.gates import Gate
 from validation.job import Job, Task
 from validation.studies import bits, bodies, corners, forms, holds, picture
+from validation.studies.factors import judge as factors
 
 # Points and directions of each mesh whose bits are judged. All faces of most meshes: only points that lie as dense as
 # faces are traced together.
@@ -24,12 +26,24 @@ PICTURE = "studies-town.png"
 
 def steps(job: Job) -> int:
     """Number of calls of ``job.step``: one for each closed form, mesh and check, one for the slope, one to draw."""
-    return len(_tasks(job))
+    return len(_tasks(job)) + len(factors.tasks(job.quick))
 
 
 def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
     """Ask all questions and draw a picture; returns a record for JSON and the gates."""
-    found = iter(job.each(_tasks(job)))
+    found = iter(job.each([*_tasks(job), *factors.tasks(job.quick)]))
+    record, gates = _judged(found)
+    exchanged = factors.record(found)
+    return record | {"factors": exchanged}, [*gates, *factors.gates(exchanged)]
+
+
+def without_factors(job: Job) -> list[Gate]:
+    """The gates of all checks but those of view factors."""
+    return _judged(iter(job.each(_tasks(job))))[1]
+
+
+def _judged(found: Iterator[dict[str, Any]]) -> tuple[dict[str, Any], list[Gate]]:
+    """The record and the gates of what the tasks of this module found, in their order."""
     shares = [next(found) for _ in forms.forms()]
     slopes = next(found)["curves"]
     bit_rows = [next(found) for _ in bodies.bodies()]
