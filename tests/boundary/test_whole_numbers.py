@@ -22,7 +22,8 @@ WHOLE: dict[str, Any] = {
     **dict.fromkeys(["points", "targets", "origins", "directions", "normals", "sun_directions", "vertices", "colors",
                      "pattern", "linear", "grid"], CORNERS),
     **dict.fromkeys(["leaving", "reaching", "side", "t_min", "t_max", "max_distance", "origin", "eye"], THREE),
-    **dict.fromkeys(["up", "normal", "weights"], UP), "texcoords": [[0, 0], [1, 0], [0, 1]], "spacing": [1, 1],
+    **dict.fromkeys(["up", "normal", "weights", "azimuth"], UP), "elevation": THREE, "transmittance": [0, 0],
+    "north": [0, 1, 0], "texcoords": [[0, 0], [1, 0], [0, 1]], "spacing": [1, 1],
     "distance": 1, "tolerance": 1, "bounds": [[0, 0, 0], [1, 1, 1]],
     "values": THREE, "values of take": [0, 0], "matrix": np.eye(4).tolist(),
 }  # fmt: skip
@@ -30,8 +31,8 @@ WHOLE: dict[str, Any] = {
 BESIDE: dict[str, Any] = {"side": {"leaving": THREE}, "bounds": {"spacing": 1}}
 OCTREE = Octree(CORNERS, [[0, 1, 2], [0, 2, 1]])  # closed, as some ask
 HITS = OCTREE.closest_hit(THREE, UP)
-# These are never made float64: the corners and materials of faces, masks and numbers of objects.
-UNROUNDED = {"faces", "face_materials", "mask", "through"}
+# These are never made float64: the corners, materials and groups of faces, masks and numbers of objects.
+UNROUNDED = {"faces", "face_materials", "mask", "through", "groups"}
 
 
 def public() -> dict[str, Any]:

@@ -252,4 +252,6 @@ def test_a_study_answers_as_its_slow_twin(study: str, data: st.DataObject) -> No
 
 def test_every_study_of_points_has_a_twin() -> None:
     functions = {name for name in studies.__all__ if inspect.isfunction(getattr(studies, name))}
-    assert {n for n in functions if "points" in inspect.signature(getattr(studies, n)).parameters} == TWINS.keys()
+    of_points = {n for n in functions if "points" in inspect.signature(getattr(studies, n)).parameters}
+    # View factors have closed forms in the place of a twin.
+    assert of_points - {"view_factors_from"} == TWINS.keys()

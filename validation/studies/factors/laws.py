@@ -10,6 +10,7 @@ from renderer.octree import Octree
 from renderer.studies import view_factors
 from validation.oracle.view_factors.rectangles import Span, parallel
 from validation.studies.factors.forms import ERRORS, FORMS
+from validation.studies.factors.heat import heat_adds_up, two_surfaces
 from validation.studies.factors.rooms import ROOMS, Plate, Room, of_plates, room_with_column, two_rooms
 
 Asked = tuple[int, int]
@@ -164,6 +165,8 @@ CHECKS = {
     "a column in a room": Check(a_column_only_hides, ("studies.view_factors",)),
     "two rooms": Check(walls_between_rooms_hide_all, ("studies.view_factors",)),
     "view factors by any threads": Check(threads_change_nothing, ("studies.view_factors",)),
+    "heat of two surfaces": Check(two_surfaces, ("radiosity.net_heat", "radiosity.Heat")),
+    "heat of a room": Check(heat_adds_up, ("radiosity.net_heat",)),
     "faces and surfaces": Check(faces_add_up_to_surfaces, ("studies.view_factors",)),
 }
 
