@@ -38,6 +38,7 @@ The public names::
 
     Packages
         renderer.studies     sky, sun, visibility, ambient occlusion, depth maps
+        renderer.radiosity   light and heat that diffuse surfaces exchange, from view factors
         renderer.cluster     the same on a Dask cluster
         renderer.trimesh_ray  a drop-in for trimesh's ray queries
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import renderer
-from renderer import cluster, shapes, studies
+from renderer import cluster, radiosity, shapes, studies
 from renderer.lazy import lazy
 from renderer.mesh.heightfield import heightfield_mesh
 
@@ -29,7 +29,7 @@ def members(kind: type) -> Iterator[tuple[str, Any]]:
 def documented() -> dict[str, Any]:
     """What the pages of the API show, by name: public names and members, and the function that is not exported."""
     found: dict[str, Any] = {"heightfield_mesh": heightfield_mesh}
-    for module in (renderer, shapes, studies, cluster):
+    for module in (renderer, shapes, studies, radiosity, cluster):
         for name in module.__all__:
             found[name] = thing = getattr(module, name)
             found.update(members(thing) if inspect.isclass(thing) else ())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,7 @@ class Split:
     """
 
     def __init__(self, mesh: Mesh, angle: float) -> None:
-        expect(0.0 <= angle <= 180.0, "crease", "an angle from 0 to 180 degrees", repr(angle))
-        joined = _joined_corners(mesh, float(np.cos(np.radians(angle))))
+        joined = _joined_corners(mesh, angle)
         _, self.group = np.unique(_components(3 * len(mesh.faces), *joined), return_inverse=True)
         # Vertices at one place may differ in colour or texture, so that one group may have several.
         keys = self.group.astype(np.int64) * max(len(mesh.vertices), 1) + mesh.faces.ravel()
@@ -36,22 +35,40 @@ class Split:
         self.group_of_vertex = self.group[first]
 
 
-def _joined_corners(mesh: Mesh, least: float) -> tuple[Indices, Indices]:
-    """Pairs of corners of faces that share an edge which is not sharp, at either end of it.
+class SmoothEdges(NamedTuple):
+    """Pairs of faces that share an edge which is not sharp; of three faces at one edge there are two pairs.
+
+    one, other  (k,), the sides of the two faces there: 3 f + k for that from corner k of face f to the next
+    back        (k,), whether one runs the other way than the other, as with faces that are turned alike
+    """
+
+    one: Indices
+    other: Indices
+    back: NDArray[np.bool_]
+
+
+def smooth_edges(mesh: Mesh, angle: float) -> SmoothEdges:
+    """The edges of ``mesh`` where the normals of the faces differ by at most ``angle``.
 
     Faces without area have no normal, and no edge of theirs is sharp.
     """
+    expect(0.0 <= angle <= 180.0, "crease", "an angle from 0 to 180 degrees", repr(angle))
     start, _, edge = sides(mesh.vertices, mesh.faces)
     order = np.argsort(edge.ravel(), kind="stable")
     same = np.flatnonzero(np.diff(edge.ravel()[order]) == 0)
     one, other = order[same], order[same + 1]
-    normals = mesh.face_normals()
+    normals, least = mesh.face_normals(), float(np.cos(np.radians(angle)))
     flat = np.equal(np.abs(normals).max(axis=1, initial=0.0), 0.0)
     cosine = np.einsum("nk,nk->n", normals[one // 3], normals[other // 3])
     # rule: sharp-edge
     smooth = (cosine >= least) | flat[one // 3] | flat[other // 3]
     one, other = one[smooth], other[smooth]
-    back = start.ravel()[one] != start.ravel()[other]
+    return SmoothEdges(one, other, start.ravel()[one] != start.ravel()[other])
+
+
+def _joined_corners(mesh: Mesh, angle: float) -> tuple[Indices, Indices]:
+    """Pairs of corners of faces that share an edge which is not sharp, at either end of it."""
+    one, other, back = smooth_edges(mesh, angle)
     near, far = np.where(back, _next(other), other), np.where(back, other, _next(other))
     return np.concatenate([one, _next(one)]), np.concatenate([near, far])
 

@@ -10,13 +10,19 @@ from typing import Any, get_args
 from pydantic import BaseModel
 
 import renderer
-from renderer import cluster, studies, trimesh_ray
+from renderer import cluster, radiosity, studies, trimesh_ray
 from renderer.cli.main import make_parser as render_parser
 from renderer.scene.scene import Scene
 from validation.options import make_parser as validate_parser
 
 # Each package, and what its names begin with.
-_PACKAGES = ((renderer, ""), (studies, "studies."), (cluster, "cluster."), (trimesh_ray, "trimesh_ray."))
+_PACKAGES = (
+    (renderer, ""),
+    (studies, "studies."),
+    (radiosity, "radiosity."),
+    (cluster, "cluster."),
+    (trimesh_ray, "trimesh_ray."),
+)
 
 
 def public_names() -> list[str]:

@@ -1,0 +1,13 @@
+from .adapt import Adapted as Adapted
+from .adapt import adaptive as adaptive
+from .colors import vertex_colors as vertex_colors
+from .patch import Patches as Patches
+from .patch import patches as patches
+from .patch import refined as refined
+from .shooting import Shooting as Shooting
+from .shooting import Shot as Shot
+from .solve import Balance as Balance
+from .solve import Radiosity as Radiosity
+from .solve import radiosity as radiosity
+from .thermal import Heat as Heat
+from .thermal import net_heat as net_heat
