@@ -21,7 +21,7 @@ from validation.studies.lit.scenes import LIT
 
 Floats = NDArray[np.float64]
 
-# Pixels of a side, and of the squares whose means are compared: at an edge of the picture's objects single pixels differ.
+# Pixels of a side, and of the squares whose means are compared: at edges of objects single pixels differ.
 _SIZE, _SQUARE = 48, 4
 # Paths a pixel: their standard error of a square is below 1 %.
 _PATHS, _QUICK_PATHS = 2048, 512
