@@ -155,10 +155,10 @@ def _with_area(mesh: Mesh) -> Mesh:
 def _part(instance: Instance, mesh: Mesh, material: Material, edge: float) -> _Part:
     if instance.smooth:
         mesh = Mesh(mesh.vertices, mesh.faces, instance.normals, mesh.colors, mesh.texcoords, mesh.name)
-    if look_of(material, mesh) is None:
+    if look_of(material, instance, mesh) is None:
         return _Part(instance, mesh, None)
     cut = patches(mesh, edge).mesh
-    return _Part(instance, cut, look_of(material, cut))
+    return _Part(instance, cut, look_of(material, instance, cut))
 
 
 def _groups(parts: list[_Part]) -> Ints:

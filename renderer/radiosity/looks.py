@@ -15,7 +15,8 @@ from renderer.materials.registry import Material
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.texture import Texture
 from renderer.mesh.texture_image import value_of_one
-from renderer.picture.maps import linear_of_srgb
+from renderer.picture.maps import linear_of_srgb, tints_of
+from renderer.scene.instance import Instance
 from renderer.scene.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -34,12 +35,14 @@ class Look(NamedTuple):
     detail: Floats
 
 
-def look_of(material: Material, mesh: Mesh) -> Look | None:
-    """The ``Look`` of a material on the faces of ``mesh``; None if it neither returns light evenly nor emits any."""
+def look_of(material: Material, instance: Instance, mesh: Mesh) -> Look | None:
+    """The ``Look`` of a material on the faces of ``mesh``, which is that of ``instance`` cut into patches; None if it
+    neither returns light evenly nor emits any.
+    """
     look = appearance_of(material)
     if not (any(look.diffuse) or any(look.emission)):
         return None
-    tint = _tint(look, mesh)
+    tint = tints_of(instance, mesh, look)[mesh.faces].mean(axis=1)
     detail, glow = (_mean_of(look.textures.get(f"{name}_map")) for name in ("diffuse", "emission"))
     diffuse, emission = look.diffuse * detail * tint, look.emission * glow * tint
     return Look(diffuse, emission, detail if shows_detail(look) else np.ones(3))
@@ -93,15 +96,6 @@ def _left_out_of(material: Material) -> list[str]:
         (mapped, f"{' and '.join(mapped)}, whose mean counts"),
     ]
     return [what for there, what in named if there]
-
-
-def _tint(look: Appearance, mesh: Mesh) -> Floats:
-    """The mean colour of the corners of each face, linear, (F, 3); 1 where colours of vertices do not count."""
-    if look.vertex_colors is None or mesh.colors is None:
-        return np.ones((len(mesh.faces), 3))
-    colors = mesh.colors.astype(np.float64)
-    linear = linear_of_srgb(colors) if look.vertex_colors == "srgb" else colors
-    return np.asarray(linear[mesh.faces].mean(axis=1))
 
 
 def _mean_of(texture: Texture | None) -> Floats:
