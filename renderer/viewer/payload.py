@@ -81,7 +81,7 @@ class Payload(NamedTuple):
 def mesh_payload(prepared: PreparedScene) -> Payload:
     """The answer to GET /mesh, little-endian: uint32 MAGIC and F, then for each of F faces the corners as 9 float32,
     then for each their shading normals as 9 float32, then the materials as F uint16, filled up to four bytes. If a
-    material uses colours of vertices, then the colours of corners in 8-bit sRGB, 9 bytes for each face, white of others.
+    material uses colours of vertices, then those of corners in 8-bit sRGB, 9 bytes for each face, white of others.
 
     Raises ``ValueError`` where there are more materials than a uint16 counts.
     """
