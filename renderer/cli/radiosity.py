@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from renderer.cli.render import resolution, stops
-from renderer.cli.scene import add_scene, say_up
+from renderer.cli.scene import add_scene, files_read, say_up
 from renderer.errors import expect
 from renderer.system.terminal import say
 
@@ -54,8 +54,8 @@ def _radiosity(options: argparse.Namespace) -> None:
 
     _check_outputs(options)
     files = scene_files(options.scene)
-    _check_no_input(options, files)
     scene = load_scene(files, up=options.up)
+    _check_no_input(options, files, scene)
     if not options.quiet:
         say_up(files, options.up)
     began = time.perf_counter()
@@ -82,10 +82,14 @@ def _check_outputs(options: argparse.Namespace) -> None:
     expect(toned, "--tone", "a .png file", repr(str(options.output[0])))
 
 
-def _check_no_input(options: argparse.Namespace, files: list[Path]) -> None:
+def _check_no_input(options: argparse.Namespace, files: list[Path], scene: Any) -> None:
+    """Refuse to write over what is read, also through links."""
+    from renderer.radiosity.files import lit_files
     from renderer.system.files import are_apart
 
-    expect(are_apart(options.output, files), "--output", "other files than the scene's own", str(files[0]))
+    written = [path for output in options.output for path in lit_files(output, len(scene.instances))]
+    apart = are_apart(written, files_read(files, scene))
+    expect(apart, "--output", "other files than the scene's own, each once", ", ".join(map(str, options.output)))
 
 
 def _write(lit: Any, output: Path, options: argparse.Namespace) -> None:

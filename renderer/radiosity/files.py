@@ -81,6 +81,13 @@ def save_lit(scene: Scene, path: str | os.PathLike[str], *, exposure: float = 0.
     return [target]
 
 
+def lit_files(path: Path, objects: int) -> list[Path]:
+    """The files that `save_lit` writes of a scene of so many objects."""
+    if path.suffix.lower() != ".toml":
+        return [path]
+    return [path, *(path.with_name(f"{path.stem}-{number}.ply") for number in range(objects))]
+
+
 def _whole(scene: Scene) -> tuple[Mesh, NDArray[np.float64]]:
     """All meshes as one, and the radiance at its vertices (V, 3); black where a material has no colours of vertices."""
     meshes = [Mesh(instance.mesh.vertices, instance.mesh.faces) for instance in scene.instances]
@@ -134,12 +141,10 @@ def _save_scene(scene: Scene, target: Path) -> list[Path]:
     lines += ["[render]", *_entries(settings.items()), ""]
     for name, material in scene.materials.items():
         lines += _table(f"[materials.{_value(name)}]", material, target.parent)
-    files = [target]
-    for number, thing in enumerate(scene.objects):
-        mesh = scene.instances[number].mesh
-        files.append(target.with_name(f"{target.stem}-{number}.ply"))
-        save_ply(mesh, files[-1])
-        shown = {"mesh": files[-1].name, "material": thing.material, "normals": thing.normals}
+    files = lit_files(target, len(scene.objects))
+    for thing, instance, file in zip(scene.objects, scene.instances, files[1:], strict=True):
+        save_ply(instance.mesh, file)
+        shown = {"mesh": file.name, "material": thing.material, "normals": thing.normals}
         lines += ["[[objects]]", *_entries(shown.items()), ""]
     write_atomically(target, lambda file: file.write("\n".join(lines).encode()))
     return files
