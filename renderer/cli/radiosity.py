@@ -50,12 +50,13 @@ def add_radiosity(commands: Any) -> None:
 def _radiosity(options: argparse.Namespace) -> None:
     # Imported here so that --help and --version need no compiler.
     from renderer.radiosity import lit_scene
-    from renderer.scene.scene import load_scene, scene_files
+    from renderer.scene.scene import checked_settings, load_scene, scene_files
 
     _check_outputs(options)
     files = scene_files(options.scene)
     scene = load_scene(files, up=options.up)
     _check_no_input(options, files, scene)
+    checked_settings(scene.render, {"resolution": options.resolution, "samples": options.samples}, scene.camera)
     if not options.quiet:
         say_up(files, options.up)
     began = time.perf_counter()

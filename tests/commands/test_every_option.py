@@ -39,7 +39,7 @@ PICTURES: dict[str, tuple[str, Any]] = {
 }
 # Those that change no bit.
 BITLESS = {"--accelerator", "--split", "--threads"}
-# The options that other tests give alone; those of ``study`` are in tests/checkpoints/test_every_option.py, and those of
+# The options that other tests give alone. Those of ``study`` are in tests/checkpoints/test_every_option.py, those of
 # ``radiosity`` in test_radiosity_command.py.
 HERE = {
     "render": {*PICTURES, "scene", "--output", "--write-scene", "--quiet", "--cluster", "--window"},

@@ -17,8 +17,8 @@ from renderer.cli.main import main, make_parser
 from renderer.radiosity import lit_scene
 
 OPTIONS = (
-    "scene", "--up", "--output", "--edge", "--rtol", "--max-rays", "--crease", "--resolution", "--samples", "--exposure",
-    "--tone", "--threads", "--quiet",
+    "scene", "--up", "--output", "--edge", "--rtol", "--max-rays", "--crease", "--resolution", "--samples",
+    "--exposure", "--tone", "--threads", "--quiet",
 )  # fmt: skip
 pytestmark = pytest.mark.judges("octree-render radiosity", *(f"octree-render radiosity {name}" for name in OPTIONS))
 

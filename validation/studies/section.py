@@ -7,6 +7,7 @@ from typing import Any
 from validation.gates import Gate
 from validation.job import Job, Task
 from validation.studies import bits, bodies, corners, forms, holds, picture
+from validation.studies.lit import judge as lit
 
 # Points and directions of each mesh whose bits are judged. All faces of most meshes: only points that lie as dense as
 # faces are traced together.
@@ -36,6 +37,7 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
     corner_rows = [next(found) for _ in corners.CHECKS]
     held = [next(found) for _ in holds.CHECKS]
     drawn = next(found)
+    lighted = lit.record(found)
     gates = [
         *(Gate("studies", row["subject"], "error over its bound", row["share_of_bound"], "at most", 1.0, _BOUND,
                (f"studies.{row['study']}",))
@@ -50,9 +52,11 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
                "at most", 0.0, _NAMED, ("studies.sky_view_factor",)) for row in corner_rows),
         *(Gate("studies", row["subject"], "wrong answers", float(row["wrong"]), "at most", 0.0, _HOLDS, row["judged"])
           for row in held),
+        *lit.gates(lighted),
     ]  # fmt: skip
     record = {"forms": shares, "slopes": slopes, "bits": bit_rows, "corners": corner_rows, "holds": held,
-              "picture": drawn, "patches": list(forms.PATCHES), "costs": dict.fromkeys(JUDGES)}  # fmt: skip
+              "picture": drawn, "lit": lighted, "patches": list(forms.PATCHES),
+              "costs": dict.fromkeys(JUDGES)}  # fmt: skip
     return record, gates
 
 
@@ -68,4 +72,5 @@ def _tasks(job: Job) -> list[Task]:
           for index, (name, kind) in enumerate(corners.CHECKS)),
         *(Task(f"studies: {name}", partial(holds.check, name)) for name in holds.CHECKS),
         Task("studies: picture", partial(picture.write, Path(job.folder) / PICTURE)),
+        *lit.tasks(job.quick),
     ]  # fmt: skip
