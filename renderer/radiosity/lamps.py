@@ -46,20 +46,21 @@ def _light_of(octree: Queries, light: Light, faces: Ints, normals: Floats, corne
     points = np.einsum("pk,nkc->npc", _POINTS, corners)
     if isinstance(light, DirectionalLight):
         towards: Floats = np.broadcast_to(-unit(light.direction), points.shape)
-        farthest, color = np.inf, light.irradiance
-        cosines = np.einsum("npc,nc->np", towards, normals)
-        arriving = cosines
+        falloff, farthest, color = 1.0, np.inf, light.irradiance
     else:
         towards = np.array(light.position) - points
-        farthest, color = SHORT_OF_LIGHT, light.intensity
-        cosines = np.einsum("npc,nc->np", towards, normals)
-        # rule: patch-inverse-square
-        with np.errstate(divide="ignore", invalid="ignore"):  # at the light itself no face faces it
-            arriving = cosines * np.einsum("npc,npc->np", towards, towards) ** -1.5
+        falloff, farthest, color = _falloff(towards), SHORT_OF_LIGHT, light.intensity
+    cosines = np.einsum("npc,nc->np", towards, normals) * falloff
     # rule: patch-faces-light
     row, point = np.nonzero(cosines > 0.0)
-    some = row, point
-    hidden = octree.any_hit(points[some], towards[some], t_max=farthest, leaving=faces[row], side=1)
+    hidden = octree.any_hit(points[row, point], towards[row, point], t_max=farthest, leaving=faces[row], side=1)
     # rule: patch-shadows
-    seen = np.bincount(row, np.where(hidden, 0.0, arriving[some]), len(faces)) / len(_POINTS)
+    seen = np.bincount(row, np.where(hidden, 0.0, cosines[row, point]), len(faces)) / len(_POINTS)
     return seen[:, None] * np.array(color)
+
+
+def _falloff(towards: Floats) -> Floats:
+    """What the dot product of a normal and the way to a point light becomes light by: 1 / r^3; 0 at the light."""
+    squares = np.einsum("npc,npc->np", towards, towards)
+    # rule: patch-inverse-square
+    return np.divide(1.0, squares * np.sqrt(squares), out=np.zeros_like(squares), where=squares > 0.0)

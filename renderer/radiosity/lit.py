@@ -192,7 +192,6 @@ def _warn_of_backs(factors: ViewFactors) -> None:
 
 def _shown(scene: Scene, parts: list[_Part], values: list[Floats], crease: float) -> Scene:
     """The scene whose patches have these radiances, (n, 3) for each part."""
-    # rule: detail-apart
     shown = [None if p.look is None else _over(rows, p.look.detail) for p, rows in zip(parts, values, strict=True)]
     brightness: dict[str, Floats] = {}
     for part, colors in zip(parts, shown, strict=True):

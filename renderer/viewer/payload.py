@@ -91,7 +91,6 @@ def mesh_payload(prepared: PreparedScene) -> Payload:
     starts, filling = range(0, count, _FACES), count % 2 * 2
     parts = (_corners, _normals, _materials)
     chunks = (part(arrays, slice(i, i + _FACES)).tobytes() for part in parts for i in starts)
-    # rule: colours-of-corners
     tinted = count > 0 and bool((arrays.tints != 1.0).any())
     tints = (_tints(arrays, slice(i, i + _FACES)).tobytes() for i in (starts if tinted else ()))
     size = 8 + 74 * count + filling + 9 * count * tinted

@@ -19,9 +19,7 @@ pytestmark = pytest.mark.judges(
 def dense(factors, emission, reflectance, sky=0.0):
     """B by elimination, each channel alone."""
     n = len(factors.areas)
-    emission, reflectance = (
-        np.broadcast_to(np.reshape(a, (len(np.atleast_1d(a)), -1)), (n, 3)) for a in (emission, reflectance)
-    )
+    emission, reflectance = (np.broadcast_to(given, (n, 3)) for given in (emission, reflectance))
     sky = np.broadcast_to(sky, 3)
     matrix = factors.exchange.toarray() / factors.areas[:, None]
     columns = []
@@ -179,6 +177,11 @@ def test_no_light_is_no_error():
 
 
 CUBE = enclosures.cube()
+SHAPE = "expected one number, shape (6,) or (6, 3), a row a surface, got shape"
+
+
+def cube(**changes):
+    return {"factors": replace(CUBE, **changes)}
 
 
 @cases(
@@ -189,8 +192,8 @@ CUBE = enclosures.cube()
         ({"reflectance": [0, 0, 0.5, 1.25, 0, 2]}, "reflectance: expected numbers less than 1, got [1.25] in row 3"),
         ({"reflectance": -0.5}, "reflectance: expected finite numbers >= 0, got [-0.5] in row 0"),
         ({"reflectance": np.full((6, 3), np.nan)}, "reflectance: expected finite numbers >= 0, got [nan, nan, nan] in"),
-        ({"reflectance": [0.5] * 5}, "reflectance: expected one number, shape (6,) or (6, 3), a row a surface, got shape (5,)"),
-        ({"emission": np.zeros((3, 6))}, "emission: expected one number, shape (6,) or (6, 3), a row a surface, got shape (3, 6)"),
+        ({"reflectance": [0.5] * 5}, f"reflectance: {SHAPE} (5,)"),
+        ({"emission": np.zeros((3, 6))}, f"emission: {SHAPE} (3, 6)"),
         ({"emission": [0, 0, 0, 0, 0, -1]}, "emission: expected finite numbers >= 0, got [-1.0] in row 5"),
         ({"emission": np.inf}, "emission: expected finite numbers >= 0, got [inf] in row 0"),
         ({"emission": "bright"}, "emission: expected real numbers, got dtype <U6"),
@@ -199,14 +202,17 @@ CUBE = enclosures.cube()
         ({"rtol": 0}, "rtol: expected a number between 0 and 1, got 0"),
         ({"rtol": 1e-18}, "rtol: expected at least "),
         ({"max_iterations": 0}, "max_iterations: expected an integer >= 1, got 0"),
-        ({"reflectance": 0.99, "emission": [1, 0, 0, 0, 0, 0], "max_iterations": 1}, "max_iterations: expected more iterations"),
-        ({"factors": replace(CUBE, areas=np.array([1, 1, 0, 1, 1, 1.0]))}, "factors: expected areas that are finite and > 0, got 0.0 in row 2"),
-        ({"factors": replace(CUBE, sky=np.full(6, -1.0))}, "factors: expected shares of sky >= 0, got -1.0 in row 0"),
-        ({"factors": replace(CUBE, exchange=csr_array(-np.eye(6)))}, "factors: expected exchanges >= 0, finite, got -1.0"),
-        ({"factors": replace(CUBE, exchange=csr_array(np.eye(5)))}, "factors: expected an exchange of shape (6, 6), got shape (5, 5)"),
-        ({"factors": replace(CUBE, exchange=CUBE.exchange * 3.0)}, "factors: expected rows whose sum is at most 1, got 3.0"),
+        ({"emission": np.arange(6), "max_iterations": 1}, "max_iterations: expected more iterations, as these leave a"),
+        (
+            cube(areas=np.array([1, 1, 0, 1, 1, 1.0])),
+            "factors: expected areas that are finite and > 0, got 0.0 in row 2",
+        ),
+        (cube(sky=np.full(6, -1.0)), "factors: expected shares of sky >= 0, got -1.0 in row 0"),
+        (cube(exchange=csr_array(-np.eye(6))), "factors: expected exchanges >= 0, finite, got -1.0"),
+        (cube(exchange=csr_array(np.eye(5))), "factors: expected an exchange of shape (6, 6), got shape (5, 5)"),
+        (cube(exchange=CUBE.exchange * 3.0), "factors: expected rows whose sum is at most 1, got 3"),
     ],
-)  # fmt: skip
+)
 def test_bad_input_is_named(arguments, message):
     given = {"factors": CUBE, "emission": 1.0, "reflectance": 0.5} | arguments
     with pytest.raises(ValueError) as caught:

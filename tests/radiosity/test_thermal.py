@@ -62,11 +62,9 @@ def test_a_wall_without_heat_between_two(first, second):
         heat = net_heat(factors, [first, second, third], [700.0, 350.0, np.nan])
         np.testing.assert_allclose(heat.net, [flow, -flow, 0.0], rtol=1e-7, atol=1e-12)
         assert heat.net[2] == 0.0
-        sent = [
-            SIGMA * t**4 - side * flow * (1 - e) / (a * e)
-            for t, side, e, a in ((700, 1, first, 3), (350, -1, second, 4))
-        ]
-        mean = (s[0, 2] * sent[0] + s[1, 2] * sent[1]) / (s[0, 2] + s[1, 2])
+        warm = SIGMA * 700.0**4 - flow * (1 - first) / (3.0 * first)
+        cold = SIGMA * 350.0**4 + flow * (1 - second) / (4.0 * second)
+        mean = (s[0, 2] * warm + s[1, 2] * cold) / (s[0, 2] + s[1, 2])
         np.testing.assert_allclose(heat.temperature, [700.0, 350.0, (mean / SIGMA) ** 0.25], rtol=1e-8)
         np.testing.assert_allclose(heat.radiosity[2], mean, rtol=1e-7)
 
@@ -122,6 +120,10 @@ def test_what_surfaces_lose_goes_to_the_sky():
     assert abs(heat.net.sum() - heat.to_sky) <= factors.areas.sum() * heat.bound
 
 
+KELVIN = "temperature: expected numbers >= 0 in kelvin, or NaN for adiabatic surfaces, got"
+ALONE = "temperature: expected one for a surface that each adiabatic one sees, got none for that of row"
+
+
 @cases(
     ("arguments", "message"),
     [
@@ -129,15 +131,15 @@ def test_what_surfaces_lose_goes_to_the_sky():
         ({"emissivity": [1, 1, 1, 1.5, 1, 1]}, "emissivity: expected numbers > 0 and at most 1, got 1.5 in row 3"),
         ({"emissivity": [np.nan] * 6}, "emissivity: expected numbers > 0 and at most 1, got nan in row 0"),
         ({"emissivity": [0.5, 0.5]}, "emissivity: expected one number or shape (6,), one a surface, got shape (2,)"),
-        ({"temperature": -1.0}, "temperature: expected numbers >= 0 in kelvin, or NaN for adiabatic surfaces, got -1.0 in row 0"),
-        ({"temperature": np.inf}, "temperature: expected numbers >= 0 in kelvin, or NaN for adiabatic surfaces, got inf in row 0"),
-        ({"temperature": np.nan}, "temperature: expected one for a surface that each adiabatic one sees, got none for that of row 0"),
+        ({"temperature": -1.0}, f"{KELVIN} -1.0 in row 0"),
+        ({"temperature": np.inf}, f"{KELVIN} inf in row 0"),
+        ({"temperature": np.nan}, f"{ALONE} 0"),
         ({"sky_temperature": -3}, "sky_temperature: expected a finite number >= 0 in kelvin, or None, got -3"),
         ({"rtol": 2}, "rtol: expected a number between 0 and 1, got 2"),
         ({"max_iterations": 1.5}, "max_iterations: expected an integer >= 1, got 1.5"),
         ({"factors": None}, "factors: expected ViewFactors, as renderer.studies.view_factors returns, got NoneType"),
     ],
-)  # fmt: skip
+)
 def test_bad_input_is_named(arguments, message):
     given = {"factors": enclosures.cube(), "emissivity": 0.9, "temperature": [300.0] * 6} | arguments
     with pytest.raises(ValueError) as caught:

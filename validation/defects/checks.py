@@ -31,6 +31,8 @@ from validation.scenes import SCENES
 from validation.stability import sweeps
 from validation.stability.section import CASES, check_case
 from validation.studies import section as study_section
+from validation.studies.factors import judge
+from validation.studies.lit import judge as lit_judge
 from validation.thresholds import Thresholds
 
 SEED = 2029
@@ -138,7 +140,17 @@ def scenes(job: Job) -> Iterator[Gate]:
 
 def studies(job: Job) -> list[Gate]:
     """Closed forms, bits beside Embree and at corners, and what holds exactly."""
-    return study_section.run(job)[1]
+    return study_section.without_factors(job)
+
+
+def factors(job: Job) -> list[Gate]:
+    """Closed forms and laws of view factors, rooms beside Embree, and errors."""
+    return judge.run(job)
+
+
+def lit(job: Job) -> list[Gate]:
+    """Pictures by radiosity beside random paths, and a furnace."""
+    return lit_judge.run(job)
 
 
 # A defect in the picture's modules cannot change a hit, and a defect in hits needs no picture to be caught.
@@ -156,5 +168,7 @@ GROUPS: dict[str, tuple[Callable[[Job], Iterable[Gate]], ...]] = {
     "queries": (promised(promises.QUERIES), queries, extreme(51, 54)),
     "scenes": (promised(promises.SCENES), scenes),
     "studies": (studies,),
+    "factors": (factors,),
+    "lit": (lit,),
     "pictures": (promised(promises.PICTURES), pictures, unseen, extreme(33, 45), extreme(47, 48)),
 }

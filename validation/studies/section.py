@@ -1,5 +1,6 @@
-"""The section on studies: sky view factors, hours of sun and occlusion against closed forms, Embree and exact bits."""
+"""The section on studies: skies, sun, occlusion and view factors against closed forms, Embree and exact bits."""
 
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 from validation.gates import Gate
 from validation.job import Job, Task
 from validation.studies import bits, bodies, corners, forms, holds, picture
+from validation.studies.factors import judge as factors
 from validation.studies.lit import judge as lit
 
 # Points and directions of each mesh whose bits are judged. All faces of most meshes: only points that lie as dense as
@@ -25,19 +27,30 @@ PICTURE = "studies-town.png"
 
 def steps(job: Job) -> int:
     """Number of calls of ``job.step``: one for each closed form, mesh and check, one for the slope, one to draw."""
-    return len(_tasks(job))
+    return len(_tasks(job)) + len(factors.tasks(job.quick)) + len(lit.tasks(job.quick))
 
 
 def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
     """Ask all questions and draw a picture; returns a record for JSON and the gates."""
-    found = iter(job.each(_tasks(job)))
+    found = iter(job.each([*_tasks(job), *factors.tasks(job.quick), *lit.tasks(job.quick)]))
+    record, gates = _judged(found)
+    exchanged, lighted = factors.record(found), lit.record(found)
+    return record | {"factors": exchanged, "lit": lighted}, [*gates, *factors.gates(exchanged), *lit.gates(lighted)]
+
+
+def without_factors(job: Job) -> list[Gate]:
+    """The gates of all checks but those of view factors and radiosity."""
+    return _judged(iter(job.each(_tasks(job))))[1]
+
+
+def _judged(found: Iterator[dict[str, Any]]) -> tuple[dict[str, Any], list[Gate]]:
+    """The record and the gates of what the tasks of this module found, in their order."""
     shares = [next(found) for _ in forms.forms()]
     slopes = next(found)["curves"]
     bit_rows = [next(found) for _ in bodies.bodies()]
     corner_rows = [next(found) for _ in corners.CHECKS]
     held = [next(found) for _ in holds.CHECKS]
     drawn = next(found)
-    lighted = lit.record(found)
     gates = [
         *(Gate("studies", row["subject"], "error over its bound", row["share_of_bound"], "at most", 1.0, _BOUND,
                (f"studies.{row['study']}",))
@@ -52,11 +65,9 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
                "at most", 0.0, _NAMED, ("studies.sky_view_factor",)) for row in corner_rows),
         *(Gate("studies", row["subject"], "wrong answers", float(row["wrong"]), "at most", 0.0, _HOLDS, row["judged"])
           for row in held),
-        *lit.gates(lighted),
     ]  # fmt: skip
     record = {"forms": shares, "slopes": slopes, "bits": bit_rows, "corners": corner_rows, "holds": held,
-              "picture": drawn, "lit": lighted, "patches": list(forms.PATCHES),
-              "costs": dict.fromkeys(JUDGES)}  # fmt: skip
+              "picture": drawn, "patches": list(forms.PATCHES), "costs": dict.fromkeys(JUDGES)}  # fmt: skip
     return record, gates
 
 
@@ -72,5 +83,4 @@ def _tasks(job: Job) -> list[Task]:
           for index, (name, kind) in enumerate(corners.CHECKS)),
         *(Task(f"studies: {name}", partial(holds.check, name)) for name in holds.CHECKS),
         Task("studies: picture", partial(picture.write, Path(job.folder) / PICTURE)),
-        *lit.tasks(job.quick),
     ]  # fmt: skip

@@ -15,7 +15,7 @@ from renderer.radiosity import lit_scene
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.scene import Scene, SceneObject
 from validation.gates import Gate
-from validation.job import Task
+from validation.job import Job, Task
 from validation.references.mitsuba import global_light
 from validation.studies.lit.scenes import LIT
 
@@ -36,6 +36,11 @@ _MESHED = "the difference to the picture with patches twice as long, and three s
 _BLURRED = "shadows are as blurred as patches are wide"
 _KEPT = "patches blur light, and make none"
 _CONSTANT = "closed form: what emits all that it does not return is equally bright everywhere"
+
+
+def run(job: Job) -> list[Gate]:
+    """The gates of all checks."""
+    return gates(record(iter(job.each(tasks(job.quick)))))
 
 
 def tasks(quick: bool) -> list[Task]:

@@ -1,0 +1,25 @@
+"""Defects of view factors."""
+
+from typing import Any
+
+from validation.defects.changes import Change, Rule, Wrapped
+from validation.defects.edits import choice, compare, drop, element, value, without
+from validation.defects.seeded.defect import Defect
+
+
+def _unbalanced(sound: Any, exchanges: Any, areas: Any) -> Any:
+    return exchanges
+
+
+_CHANGES: dict[str, Change] = {
+    # The height h of a direction becomes that of one with any angle as likely: level / height = sqrt(2 - u) / (1 - u).
+    "surfaces send all directions alike": Rule("cosine-of-exchange", element(1, "_ * _ / math.sqrt(1.0 + _ * _)")),
+    "rays of both surfaces of a pair count twice": Rule("reciprocal-exchange", choice(then="2.0 * _")),
+    "exchange is left as rays count it": Wrapped("assemble.balanced", _unbalanced),
+    "rays to the sky end on the last surface": Rule("sky-of-row", drop),
+    "backs of faces receive": Rule("backs-of-faces", drop),
+    "what is let through is stopped, the rest goes on": Rule("transmitted-share", compare(">=")),
+    "errors are stated a third as large": Rule("error-of-replicates", value("_ / 9.0")),
+    "surfaces let nothing through of what they send": Rule("area-that-sends", without("*", 2)),
+}
+FACTORS = tuple(Defect("factors", name, change) for name, change in _CHANGES.items())

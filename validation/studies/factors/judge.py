@@ -1,0 +1,66 @@
+"""The checks of view factors as tasks, their record, and the gates on it."""
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+from validation.gates import Gate
+from validation.job import Job, Task
+from validation.studies.factors import embree, errors, forms, laws, points
+
+_FORM = "eight standard errors, as eight sequences state them; an exact entry: 1e-9 of the area"
+_ASKED = "rows have rays until each error is at most rtol of the largest entry"
+_APART = "chance is beyond five standard errors once in two million"
+_SLOPE = "random rays give -1/2; the mean of some dozen errors moves the slope by 0.05 at most"
+_HONEST = "a stated error is that of eight sequences: squares vary by a half, and their mean over entries by less"
+_LAW = "exact: it must hold for every answer"
+_MATRIX = ("studies.view_factors",)
+_POINTS = ("studies.view_factors_from",)
+
+
+def run(job: Job) -> list[Gate]:
+    """The gates of all checks."""
+    return gates(record(iter(job.each(tasks(job.quick)))))
+
+
+def tasks(quick: bool) -> list[Task]:
+    """One for each closed form, law, room beside Embree, and curve of errors."""
+    return [
+        *(Task(f"view factors: {name}", partial(forms.check, name, quick)) for name in forms.FORMS),
+        *(Task(f"view factors: {name}", partial(points.check, name, quick)) for name in points.CHECKS),
+        *(Task(f"view factors: {name}", partial(laws.check, name)) for name in laws.CHECKS),
+        *(Task(f"view factors: {name} beside Embree", partial(embree.check, name, quick)) for name in embree.ROOMS),
+        *(Task(f"view factors: errors of {name}", partial(errors.check, name, quick)) for name in errors.FORMS),
+    ]
+
+
+def record(found: Iterator[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
+    """What the tasks found, in their order."""
+    return {
+        "forms": [next(found) for _ in forms.FORMS],
+        "points": [next(found) for _ in points.CHECKS],
+        "laws": [next(found) for _ in laws.CHECKS],
+        "embree": [next(found) for _ in embree.ROOMS],
+        "errors": [next(found) for _ in errors.FORMS],
+    }
+
+
+def gates(found: dict[str, list[dict[str, Any]]]) -> list[Gate]:
+    """The gates on a record."""
+    return [
+        *(_gate(row, "error over what is allowed", "share_of_allowed", 1.0, _FORM) for row in found["forms"]),
+        *(_gate(row, "error over what is allowed", "share_of_allowed", 1.0, _FORM, _POINTS)
+          for row in found["points"]),
+        *(_gate(row, "stated error over that requested", "share_of_asked", 1.0, _ASKED) for row in found["forms"]),
+        *(_gate(row, "standard errors from Embree's rays", "apart", embree.ERRORS, _APART) for row in found["embree"]),
+        *(_gate(row, "slope of the error", "slope", errors.SLOPE, _SLOPE) for row in found["errors"]),
+        *(_gate(row, "mean square of true over stated error", "ratio", errors.HONEST, _HONEST)
+          for row in found["errors"]),
+        *(_gate(row, "wrong answers", "wrong", 0.0, _LAW, row["judged"]) for row in found["laws"]),
+    ]  # fmt: skip
+
+
+def _gate(
+    row: dict[str, Any], quantity: str, key: str, most: float, reason: str, judged: tuple[str, ...] = _MATRIX
+) -> Gate:
+    return Gate("studies", row["subject"], quantity, float(row[key]), "at most", most, reason, judged)
