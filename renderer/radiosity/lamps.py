@@ -51,7 +51,6 @@ def _light_of(octree: Queries, light: Light, faces: Ints, normals: Floats, corne
         towards = np.array(light.position) - points
         falloff, farthest, color = _falloff(towards), SHORT_OF_LIGHT, light.intensity
     cosines = np.einsum("npc,nc->np", towards, normals) * falloff
-    # rule: patch-faces-light
     row, point = np.nonzero(cosines > 0.0)
     hidden = octree.any_hit(points[row, point], towards[row, point], t_max=farthest, leaving=faces[row], side=1)
     # rule: patch-shadows

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from validation.defects.changes import Change, Rule, Wrapped
-from validation.defects.edits import call, compare, value
+from validation.defects.edits import call, value
 from validation.defects.seeded.defect import Defect
 
 
@@ -21,7 +21,6 @@ def _grey(sound: Any, mesh: Any, values: Any, **options: Any) -> Any:
 
 _CHANGES: dict[str, Change] = {
     "lights of patches fall off with the distance": Rule("patch-inverse-square", value("np.cbrt(_) ** 2")),
-    "patches are lit from behind": Rule("patch-faces-light", compare("!=")),
     "nothing hides lights from patches": Rule("patch-shadows", call("where", "_2")),
     "surfaces only emit": Wrapped("lit.radiosity", _unlit_by_emission),
     "lit surfaces have no hue": Wrapped("lit.vertex_colors", _grey),
