@@ -48,7 +48,9 @@ def test_a_furnace_that_is_not_even_is_noticed(monkeypatch: pytest.MonkeyPatch) 
     from renderer.radiosity import lit
 
     sound = lit.vertex_colors
-    monkeypatch.setattr(
-        lit, "vertex_colors", lambda mesh, values, **options: sound(mesh, np.asarray(values) * 0.9999, **options)
-    )
+
+    def darker(mesh: Any, values: Any, **options: Any) -> Any:
+        return sound(mesh, np.asarray(values) * 0.9999, **options)
+
+    monkeypatch.setattr(lit, "vertex_colors", darker)
     assert judge.check_furnace()["error"] > judge._FURNACE
