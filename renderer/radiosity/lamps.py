@@ -18,7 +18,7 @@ Ints = NDArray[np.int64]
 
 # The barycentrics of the points of a face: the middles of the four parts that its midlines cut. Shadows have five
 # steps, which is finer than the step between patches.
-_POINTS = np.array([[4.0, 1.0, 1.0], [1.0, 4.0, 1.0], [1.0, 1.0, 4.0], [2.0, 2.0, 2.0]]) / 6.0
+POINTS = np.array([[4.0, 1.0, 1.0], [1.0, 4.0, 1.0], [1.0, 1.0, 4.0], [2.0, 2.0, 2.0]]) / 6.0
 # Faces that are computed together: their rays take some 30 MB.
 _TOGETHER = 1 << 16
 
@@ -43,7 +43,7 @@ def direct_light(octree: Queries, lights: Sequence[Light], faces: Ints, *, progr
 
 def _light_of(octree: Queries, light: Light, faces: Ints, normals: Floats, corners: Floats) -> Floats:
     """The light of one light at faces with these unit normals (n, 3) and corners (n, 3, 3), (n, 3)."""
-    points = np.einsum("pk,nkc->npc", _POINTS, corners)
+    points = np.einsum("pk,nkc->npc", POINTS, corners)
     if isinstance(light, DirectionalLight):
         towards: Floats = np.broadcast_to(-unit(light.direction), points.shape)
         falloff, farthest, color = 1.0, np.inf, light.irradiance
@@ -54,7 +54,7 @@ def _light_of(octree: Queries, light: Light, faces: Ints, normals: Floats, corne
     row, point = np.nonzero(cosines > 0.0)
     hidden = octree.any_hit(points[row, point], towards[row, point], t_max=farthest, leaving=faces[row], side=1)
     # rule: patch-shadows
-    seen = np.bincount(row, np.where(hidden, 0.0, cosines[row, point]), len(faces)) / len(_POINTS)
+    seen = np.bincount(row, np.where(hidden, 0.0, cosines[row, point]), len(faces)) / len(POINTS)
     return seen[:, None] * np.array(color)
 
 

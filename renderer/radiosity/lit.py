@@ -14,6 +14,7 @@ from renderer.errors import expect
 from renderer.materials.registry import Material
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
+from renderer.radiosity.area_lights import lamps_of, light_of_lamps
 from renderer.radiosity.colors import vertex_colors
 from renderer.radiosity.lamps import direct_light
 from renderer.radiosity.looks import Look, check_reflectance, left_out, lit_material, look_of
@@ -123,14 +124,28 @@ def lit_scene(
         warnings.filterwarnings("ignore", "octree: .* see backs of faces", UserWarning)
         factors = view_factors(octree, groups, rtol=rtol, max_rays=max_rays, threads=threads, progress=progress)
     _warn_of_backs(factors)
+    values = _radiances(scene, octree, parts, groups, factors, progress)
+    ends = np.cumsum([len(part.mesh.faces) for part in parts])
+    return _shown(scene, parts, np.split(values[groups], ends[:-1]), crease)
+
+
+def _radiances(
+    scene: Scene, octree: Octree, parts: list[_Part], groups: Ints, factors: ViewFactors, progress: bool
+) -> Floats:
+    """The radiance of each surface, (n, 3)."""
     emission, diffuse = _own(parts, groups)
     patch = np.flatnonzero(np.concatenate([np.full(len(p.mesh.faces), p.look is not None) for p in parts]))
-    emission[groups[patch]] += diffuse[groups[patch]] * direct_light(octree, scene.all_lights, patch, progress=progress)
-    sky = None if scene.sky is not None else scene.background
-    found = radiosity(factors, emission, diffuse, sky=sky)
-    return _shown(
-        scene, parts, np.split(found.values[groups], np.cumsum([len(p.mesh.faces) for p in parts])[:-1]), crease
-    )
+    rows = groups[patch]
+    lamps = lamps_of(octree, emission[rows], patch)
+    light = direct_light(octree, scene.all_lights, patch, progress=progress)
+    light += light_of_lamps(octree, emission[rows], patch, lamps, progress=progress)
+    # Lamps, whose light is counted by now, are dark for view factors.
+    own = emission.copy()
+    own[rows[lamps]] = 0.0
+    source = own.copy()
+    source[rows] += diffuse[rows] * light
+    found = radiosity(factors, source, diffuse, sky=None if scene.sky is not None else scene.background)
+    return found.values + (emission - own)
 
 
 def _parts(scene: Scene, edge: float | None) -> list[_Part]:
