@@ -123,8 +123,10 @@ def adaptive(
     """
     expect(isinstance(patches, Patches), "patches", "Patches", type(patches).__name__)
     count = int(patches.faces.max(initial=-1)) + 1
-    emitted = check_channels("emission", emission, count)
-    rho = check_channels("reflectance", reflectance, count)
+    emitted, rho = (
+        np.array(np.broadcast_to(check_channels(name, values, count), (count, 3)))
+        for name, values in (("emission", emission), ("reflectance", reflectance))
+    )
     limit = real_argument("contrast", contrast)
     expect(limit.ndim == 0 and bool(0.0 < limit < np.inf), "contrast", "a finite number > 0", repr(contrast))
     left = count_argument("rounds", rounds, 0)

@@ -187,7 +187,7 @@ class _Edges:
 
 
 def _expect_few(argument: str, count: float) -> None:
-    expect(count <= MOST_PATCHES, argument, f"at most {MOST_PATCHES} patches from it", f"{count:.0f} or more")
+    expect(count <= MOST_PATCHES, argument, f"at most {MOST_PATCHES} patches from it", f"{count:.3g} or more")
 
 
 def _cut(argument: str, given: Patches, edges: _Edges, cut: NDArray[np.bool_]) -> Patches:
@@ -239,17 +239,16 @@ _PIECES = {
 def _made(given: Patches, faces: Ints, owners: Ints, ends: Ints) -> Patches:
     """The patches with new faces, each a part of the one in ``owners``, and new vertices between ``ends``."""
     mesh = given.mesh
-    carried = (_with_means(rows, ends) for rows in (mesh.normals, mesh.colors, mesh.texcoords))
-    made = Mesh(_with_means(mesh.vertices, ends), faces, *carried, name=mesh.name)
+    given_rows = (mesh.normals, mesh.colors, mesh.texcoords)
+    normals, colors, texcoords = (None if rows is None else _with_means(rows, ends) for rows in given_rows)
+    made = Mesh(_with_means(mesh.vertices, ends), faces, normals, colors, texcoords, mesh.name)
     give_materials(made, mesh.materials, mesh.face_materials, owners)
     stops = np.searchsorted(owners, [part.faces.stop for part in mesh.parts])
     give_parts(made, parts_of([part.name for part in mesh.parts], np.diff(stops, prepend=0).tolist()))
     return Patches(made, read_only(given.faces[owners]))
 
 
-def _with_means(rows: NDArray[Any] | None, ends: Ints) -> NDArray[Any] | None:
+def _with_means(rows: NDArray[Any], ends: Ints) -> NDArray[Any]:
     """Rows of vertices, and behind them those in the middle between two; the order of the two changes no bit."""
-    if rows is None:
-        return None
     half = rows.dtype.type(0.5)
     return np.concatenate([rows, half * rows[ends[:, 0]] + half * rows[ends[:, 1]]])

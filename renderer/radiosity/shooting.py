@@ -17,8 +17,9 @@ from renderer.rayscene.scene import RayScene
 from renderer.studies.factors.aim import senders_of
 from renderer.studies.factors.compute import check_effort
 from renderer.studies.factors.result import ViewFactors
-from renderer.studies.factors.rows import FIRST_RAYS, SKY, Tracing, nothing_known, trace_rows
+from renderer.studies.factors.rows import FIRST_RAYS, Tracing, nothing_known, trace_rows
 from renderer.studies.factors.surfaces import check_surfaces
+from renderer.studies.factors.tally import SKY
 from renderer.studies.share import octree_of
 from renderer.system.threads import checked_threads
 
@@ -134,8 +135,9 @@ class Shooting(Iterator[Shot]):
         max_rays: int = 1 << 16,
         threads: int | None = None,
     ) -> None:
-        given = isinstance(scene, ViewFactors)
-        self._rows: _Rows = _Known(scene) if given else _Traced(scene, ray_rtol, max_rays, threads)
+        self._rows: _Rows = (
+            _Known(scene) if isinstance(scene, ViewFactors) else _Traced(scene, ray_rtol, max_rays, threads)
+        )
         self._areas = self._rows.areas
         n = len(self._areas)
         emitted, rho = (

@@ -58,6 +58,7 @@ class Heat:
     >>> from renderer.studies import view_factors
     >>> heat = net_heat(view_factors(Octree.from_mesh(box())), 0.9, 293.15, sky_temperature=263.15)
     >>> heat.flux[10].round(2), heat.net[10].round(2)
+    (np.float64(132.17), np.float64(66.09))
     """
 
     net: Floats
@@ -131,7 +132,10 @@ def net_heat(
     >>> room = box((0, 0, 0), (4, 3, 2.5))
     >>> factors = view_factors(Octree(room.vertices, room.faces[:, ::-1]), [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5])
     >>> heat = net_heat(factors, 1.0, [np.nan, np.nan, np.nan, np.nan, 303.15, 293.15])
-    >>> heat.net.round(1) + 0.0, heat.temperature.round(2)
+    >>> heat.net.round(1)
+    array([   0. ,    0. ,    0. ,    0. ,  466.2, -466.2])
+    >>> heat.temperature.round(2)
+    array([298.28, 298.28, 298.28, 298.28, 303.15, 293.15])
     """
     exchange = check_factors(factors)
     n = len(exchange.areas)
@@ -153,8 +157,9 @@ def net_heat(
     flux = share * (emitted - arriving) + 0.0  # without the sign of a zero
     degrees = np.where(adiabatic, (arriving / SIGMA) ** 0.25, degrees)
     to_sky = float((exchange.areas * (exchange.sky * leaving - above)).sum())
-    rows = (read_only(row) for row in (exchange.areas * flux, flux, degrees, np.array(leaving), arriving))
-    return Heat(*rows, to_sky, found.bound, found.iterations)
+    net = read_only(exchange.areas * flux)
+    flux, degrees, leaving, arriving = (read_only(row) for row in (flux, degrees, np.array(leaving), arriving))
+    return Heat(net, flux, degrees, leaving, arriving, to_sky, found.bound, found.iterations)
 
 
 def _column(argument: str, values: ArrayLike, n: int) -> Floats:

@@ -111,7 +111,7 @@ def test_a_file_keeps_the_colors_and_a_picture_shows_them(tmp_path):
         lights=[DirectionalLight(direction=(0, -1, 0), irradiance=0.0)],
         ambient=1.0,
     )
-    picture = render(scene, width=8, height=8).radiance
+    picture = render(scene, resolution=(8, 8)).radiance
     np.testing.assert_allclose(picture[:, 1], np.tile([0.5, 0.1, 0.0], (8, 1)), atol=1e-5)
     np.testing.assert_allclose(picture[:, 6], np.tile([0.0, 0.2, 0.8], (8, 1)), atol=1e-5)
 

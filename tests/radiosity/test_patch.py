@@ -156,7 +156,7 @@ def test_cuts_stay_near_what_is_marked():
         ([1.0], "edge: expected a finite number > 0, got [1.0]"),
         ("1", "edge: expected real numbers, got dtype <U1"),
         # A square metre in patches of a nanometre.
-        (1e-9, "edge: expected at most 16777216 patches from it, got 13856406460551020544 or more"),
+        (1e-9, "edge: expected at most 16777216 patches from it, got 1.39e+19 or more"),
     ],
 )
 def test_a_bad_edge_is_named(edge, message):
@@ -182,7 +182,7 @@ def test_too_many_patches_are_named(monkeypatch):
     monkeypatch.setattr("renderer.radiosity.patch.MOST_PATCHES", 100)
     # So thin that their area says nothing.
     thin = box((0, 0, 0), (1, 1e-9, 1e-9))
-    with pytest.raises(ValueError, match=r"^edge: expected at most 100 patches from it, got 1\d\d or more"):
+    with pytest.raises(ValueError, match=r"^edge: expected at most 100 patches from it, got 220 or more"):
         patches(thin, 0.01)
     cut = patches(box(), 0.5)
     with pytest.raises(ValueError, match=r"^marked: expected at most 100 patches from it, got 384 or more"):

@@ -1,10 +1,12 @@
 """Where rays start on a surface, and where they go: points uniform by area, directions by the cosine law.
 
-The rays of a surface follow a Kronecker sequence in four dimensions, two for the point and two for the direction, eight
-times with shifts of their own: what these eight find differs as much as each errs.
+All surfaces send the same rays, each in its own frame, so the rays of faces beside each other travel together, and
+errors over a wall are smooth. The rays follow a Kronecker sequence in four dimensions, two for the point and two for
+the direction, eight times with shifts of their own: what these eight find differs as much as each errs.
 """
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -19,15 +21,15 @@ from renderer.numerics.vec3 import add, put3, row3, scale, three
 from renderer.studies.factors.surfaces import Surfaces
 from renderer.trace.starts.record import ABOVE, KNOWN
 
-# The sequences of a row, each with a shift of its own, and their dimensions.
+# The sequences, each with a shift of its own, and their dimensions.
 REPLICATES, _DIMENSIONS = 8, 4
 # The steps of the sequence times 2^64: 1/g, 1/g^2, ... for the root g of g^5 = g + 1 (Roberts 2018).
 _ROOT = 1.1673039782614187
 _STEPS = np.array([int(2.0**64 / _ROOT**k) for k in range(1, _DIMENSIONS + 1)], np.uint64)
-_STEP_0, _STEP_1, _STEP_2, _STEP_3 = _STEPS
-_TURN = 2.0 * math.pi
 # The golden ratio times 2^64, by which SplitMix64 counts.
 WEYL = np.uint64(0x9E3779B97F4A7C15)
+# The columns of a ray: the share of the area before its point, the place across there, and the direction in the frame.
+SHARE, ACROSS, DIRECTION, RAY = 0, 1, 2, 5
 
 
 class Senders(NamedTuple):
@@ -88,17 +90,18 @@ def frames_of(normals: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate([x, np.cross(z, x), z], axis=1)
 
 
-def shifts_of(rows: NDArray[np.int64]) -> NDArray[np.uint64]:
-    """The shifts of the sequences of some rows, (rows, REPLICATES * 4): they depend on the row alone."""
-    count = REPLICATES * _DIMENSIONS
-    numbers = rows.astype(np.uint64)[:, None] * np.uint64(count) + np.arange(1, count + 1, dtype=np.uint64)
-    return mixed(numbers * WEYL)
-
-
-@inlined
-def _unit(shift, index, step):
-    """A number of the sequence, in [0, 1)."""
-    return np.float64((shift + np.uint64(index) * step) >> np.uint64(11)) * 2.0**-53
+@lru_cache(maxsize=64)
+def rays_from(begin: int, count: int) -> NDArray[np.float64]:
+    """The rays from ``begin`` on that every surface sends, (count, RAY)."""
+    rays = np.arange(begin, begin + count, dtype=np.uint64)
+    numbers = np.arange(1, REPLICATES * _DIMENSIONS + 1, dtype=np.uint64) * WEYL
+    shifts = mixed(numbers).reshape(REPLICATES, _DIMENSIONS)[rays % np.uint64(REPLICATES)]
+    bits = shifts + (rays // np.uint64(REPLICATES))[:, None] * _STEPS
+    share, across, u, v = ((bits >> np.uint64(11)).astype(np.float64) * 2.0**-53).T
+    turn = 2.0 * np.pi * v
+    # rule: cosine-of-exchange
+    level, height = np.sqrt(u), np.sqrt(1.0 - u)
+    return np.stack([share, across, level * np.cos(turn), level * np.sin(turn), height], axis=1)
 
 
 @kernel
@@ -115,42 +118,36 @@ def _member_at(ends, begin, end, share):
 
 
 @inlined
-def _direction(frame, u, v, side):
-    """A direction on a side of a frame's plane whose density is that of the cosine."""
-    # rule: cosine-of-exchange
-    level, height = math.sqrt(u), math.sqrt(1.0 - u)
-    across = add(scale(row3(frame, 0), level * math.cos(_TURN * v)), scale(row3(frame, 1), level * math.sin(_TURN * v)))
-    return add(across, scale(row3(frame, 2), side * height))
+def _direction(frame, ray, side):
+    """The direction of a ray, on a side of a frame's plane."""
+    x, y, z = three(ray, DIRECTION)
+    across = add(scale(row3(frame, 0), x), scale(row3(frame, 1), y))
+    return add(across, scale(row3(frame, 2), side * z))
 
 
 @kernel
-def aim_rows(
-    first, members, ends, corners, frames, both, above, shifts, rows, begin, count, origins, directions, faces, codes
-):  # fmt: skip
-    """Write the rays from ``begin`` on, ``count`` of each of the rows, one row after the other.
+def aim_rows(first, members, ends, corners, frames, both, above, rays, rows, origins, directions, faces, codes):
+    """Write the rays of some rows: the first of each, then the second of each, and so on.
 
     first, members ... above  the arrays of ``Senders``
-    shifts                   those of the rows
-    origins, directions      (rows * count, 3) float64
-    faces, codes             (rows * count,) int64: the face that each ray leaves, and the bits of ``starts.record``
+    rays                      (n, RAY) float64, of ``rays_from``
+    origins, directions       (n * rows, 3) float64
+    faces, codes              (n * rows,) int64: the face that each ray leaves, and the bits of ``starts.record``
     """
-    for s in range(len(rows)):
-        for k in range(count):
-            ray, i = begin + k, s * count + k
-            shift = offset(pointer(shifts), (s * REPLICATES + ray % REPLICATES) * _DIMENSIONS)
-            index, low, high = ray // REPLICATES, first[rows[s]], first[rows[s] + 1]
-            share = _unit(load(shift, 0), index, _STEP_0)
-            member = _member_at(pointer(ends), low, high, share)
+    for k in range(len(rays)):
+        ray = offset(pointer(rays), RAY * k)
+        for s in range(len(rows)):
+            low, i, share = first[rows[s]], k * len(rows) + s, load(ray, SHARE)
+            member = _member_at(pointer(ends), low, first[rows[s] + 1], share)
             before = ends[member - 1] if member > low else 0.0
             inside, side = (share - before) / (ends[member] - before), 1.0
             if both[member]:
                 inside, side = (2.0 * inside, 1.0) if inside < 0.5 else (2.0 * inside - 1.0, -1.0)
             # Uniform in a triangle: the square root of one number, and the other across.
-            root, across = math.sqrt(inside), _unit(load(shift, 1), index, _STEP_1)
+            root, across = math.sqrt(inside), load(ray, ACROSS)
             place, frame = offset(pointer(corners), 9 * member), offset(pointer(frames), 9 * member)
             sides = add(scale(row3(place, 1), root * (1.0 - across)), scale(row3(place, 2), root * across))
             put3(pointer(origins), 3 * i, add(three(place, 0), sides))
-            u, v = _unit(load(shift, 2), index, _STEP_2), _unit(load(shift, 3), index, _STEP_3)
-            put3(pointer(directions), 3 * i, _direction(frame, u, v, side))
+            put3(pointer(directions), 3 * i, _direction(frame, ray, side))
             store(pointer(faces), i, members[member])
             store(pointer(codes), i, np.int64(KNOWN | (ABOVE if (side > 0.0) == above[member] else 0)))

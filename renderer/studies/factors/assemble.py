@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from renderer.studies.factors.balance import Exchanges, balanced
 from renderer.studies.factors.known import KnownPairs
 from renderer.studies.factors.result import ViewFactors, csr_array
-from renderer.studies.factors.rows import BACK, SKY, RowHits
+from renderer.studies.factors.rows import RowHits
 from renderer.studies.factors.sparse import scipy_sparse
+from renderer.studies.factors.tally import BACK, SKY
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

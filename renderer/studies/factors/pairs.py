@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import load, local_doubles, maximum, minimum, offset, pointer
 from renderer.numerics.vec3 import add, cross, dot, largest_component, put3, row3, scale, sub
-from renderer.queryable import Queries
+from renderer.queryable import Built
 from renderer.studies.factors.contour import RULES, exchange_area
 from renderer.studies.factors.shaft import MOST_PLANES, PLANE, ROUNDING, Shaft, is_clear, with_planes
 from renderer.system.threads import for_chunks
@@ -48,7 +48,7 @@ class _Known(NamedTuple):
 
 
 def exact_pairs(
-    octree: Queries,
+    built: Built,
     pairs: NDArray[np.int64],
     threads: int,
     update: Callable[[int], object] | None = None,
@@ -59,7 +59,8 @@ def exact_pairs(
 
     Parameters
     ----------
-    octree : Octree or BruteForce
+    built : Built
+        The mesh and its tree.
     pairs : ndarray of int64, shape (k, 2)
         Numbers of two faces, the lower first.
     threads : int
@@ -86,10 +87,10 @@ def exact_pairs(
     >>> from renderer import Octree
     >>> from renderer.studies.factors.pairs import exact_pairs
     >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 1, 1], [1, 0, 1]]
-    >>> exchange, known = exact_pairs(Octree(corners, [[0, 1, 2], [3, 4, 5]]), np.array([[0, 1]]), 1)
+    >>> exchange, known = exact_pairs(Octree(corners, [[0, 1, 2], [3, 4, 5]])._built, np.array([[0, 1]]), 1)
     >>> known.tolist(), exchange.round(6).tolist()
     """
-    mesh, tree = octree._built
+    mesh, tree = built
     exchange, known = np.zeros(len(pairs)), np.zeros(len(pairs), np.bool_)
     if len(pairs) == 0:
         return exchange, known

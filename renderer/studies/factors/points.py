@@ -15,9 +15,10 @@ from renderer.studies.factors.aim import senders_at
 from renderer.studies.factors.assemble import warn_of_backs
 from renderer.studies.factors.compute import check_effort
 from renderer.studies.factors.result import PointFactors
-from renderer.studies.factors.rows import BACK, SKY, Tracing, nothing_known, trace_rows
+from renderer.studies.factors.rows import Tracing, nothing_known, trace_rows
 from renderer.studies.factors.sparse import scipy_sparse
 from renderer.studies.factors.surfaces import check_surfaces
+from renderer.studies.factors.tally import BACK, SKY
 from renderer.studies.share import check_request
 
 

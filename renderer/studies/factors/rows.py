@@ -9,17 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.numerics.mixing import mixed
+from renderer.ordering.morton import order_along_curve
 from renderer.queryable import Built
 from renderer.results.hits import Hits
-from renderer.studies.factors.aim import REPLICATES, WEYL, Senders, aim_rows, shifts_of
+from renderer.studies.factors.aim import WEYL, Senders, aim_rows, rays_from
 from renderer.studies.factors.surfaces import Surfaces
-from renderer.studies.factors.tally import tally_rows
+from renderer.studies.factors.tally import tally_rows, write_keys
 from renderer.system.terminal import progress_bar
 from renderer.system.threads import for_chunks
-from renderer.trace.batch import CHUNK, Leaving, RayBatch, offset_origins, reject
+from renderer.trace.batch import CHUNK, Leaving, RayBatch, make_starts, offset_origins, reject
 from renderer.trace.closest import find_range
 from renderer.trace.leaving import check_leaving
 from renderer.trace.rays import HitArrays
+from renderer.trace.spawn import offset_from_faces
+from renderer.trace.starts.record import HEAD, ROW
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -27,8 +30,6 @@ Integers = NDArray[np.int64]
 # The rays of a row at first: the least that tells a share of a hundredth from one of a fiftieth.
 FIRST_RAYS = 256
 _ROWS = CHUNK // FIRST_RAYS
-# Targets after the last surface.
-SKY, BACK = 0, 1
 _EVERYWHERE = (np.zeros(1), np.full(1, np.inf))
 
 
@@ -90,14 +91,18 @@ def nothing_known(rows: int) -> Known:
 
 def trace_rows(tracing: Tracing, rows: Integers, known: Known) -> RowHits:
     """Trace the rays of some rows; ``known`` has all rows."""
-    parts: list[tuple[Integers, RowHits]] = []
+    none = np.empty(0, np.int64)
+    parts = [(none, RowHits(np.zeros(1, np.int64), none, none, np.empty(0), none))]
     with progress_bar(len(rows), "surface", tracing.progress) as update:
+        # Rows beside each other send rays that travel together.
+        senders = tracing.senders
+        order = order_along_curve(senders.corners[senders.first[rows], :3])[0]
 
         def trace(begin: int, end: int) -> Iterator[None]:
-            yield from _trace_until(tracing, begin + np.arange(end - begin), rows, known, parts)
+            yield from _trace_until(tracing, order[begin:end], rows, known, parts)
 
         for_chunks(trace, len(rows), _ROWS, tracing.threads, update)
-    return _in_order(parts, len(rows))
+    return _in_order(parts)
 
 
 def _trace_until(
@@ -123,23 +128,31 @@ def _tally(keys: Integers, rows: Integers, known: Known, rtol: float, last: bool
     unfinished = np.empty(count, np.bool_)
     spans = [known.targets[known.first[row] : known.first[row + 1]] for row in rows]
     first = np.concatenate([[0], np.cumsum([len(span) for span in spans])])
-    tally_rows(
-        keys, first, np.concatenate(spans), known.largest[rows], rtol, targets, counts, errors, lengths, unfinished
-    )
-    unfinished &= not last
-    used = (np.arange(rays) < np.where(unfinished, 0, lengths)[:, None]).reshape(-1)
+    written = tally_rows(
+        keys,
+        first,
+        np.concatenate(spans),
+        known.largest[rows],
+        rtol,
+        last,
+        targets,
+        counts,
+        errors,
+        lengths,
+        unfinished,
+    )  # fmt: skip
     ends = np.concatenate([[0], np.cumsum(lengths[~unfinished])])
-    return RowHits(ends, targets[used], counts[used], errors[used], np.full(len(ends) - 1, rays)), unfinished
+    columns = (column[:written].copy() for column in (targets, counts, errors))
+    return RowHits(ends, *columns, np.full(len(ends) - 1, rays)), unfinished
 
 
-def _in_order(parts: list[tuple[Integers, RowHits]], rows: int) -> RowHits:
-    """The hits of rows at their places, from records of some rows each."""
-    places = np.concatenate([part[0] for part in parts]) if parts else np.empty(0, np.int64)
-    order = np.argsort(places, kind="stable")
-    begins = np.concatenate([part.first[:-1] for _, part in parts]) if parts else places
+def _in_order(parts: list[tuple[Integers, RowHits]]) -> RowHits:
+    """The hits of rows in the order of their places, from records of some rows each."""
+    order = np.argsort(np.concatenate([own for own, _ in parts]), kind="stable")
+    begins = np.concatenate([part.first[:-1] for _, part in parts])
     sizes = np.array([len(part.targets) for _, part in parts], np.int64)
     begins = begins + np.repeat(np.cumsum(sizes) - sizes, [len(own) for own, _ in parts])
-    lengths = np.concatenate([np.diff(part.first) for _, part in parts]) if parts else places
+    lengths = np.concatenate([np.diff(part.first) for _, part in parts])
     begins, lengths = begins[order], lengths[order]
     first = np.concatenate([[0], np.cumsum(lengths)])
     entries = np.arange(first[-1]) + np.repeat(begins - first[:-1], lengths)
@@ -149,32 +162,32 @@ def _in_order(parts: list[tuple[Integers, RowHits]], rows: int) -> RowHits:
 
 def _keys_of(tracing: Tracing, rows: Integers, begin: int, count: int) -> Generator[None, None, Integers]:
     """What the rays from ``begin`` on hit, ``count`` of each row: keys as of ``tally_rows``, (rows, count)."""
-    keys, shifts = np.empty((len(rows), count), np.int64), shifts_of(rows)
+    keys = np.empty((len(rows), count), np.int64)
     width = min(count, CHUNK)
     height = max(1, CHUNK // width)
     for top in range(0, len(rows), height):
         for left in range(0, count, width):
             own, some = slice(top, top + height), min(width, count - left)
-            targets = yield from _targets_of(tracing, rows[own], shifts[own], begin + left, some)
-            sequence = (begin + left + np.arange(some)) % REPLICATES
-            keys[own, left : left + some] = targets.reshape(-1, some) * REPLICATES + sequence
+            hits = yield from _hits_of(tracing, rows[own], begin + left, some)
+            write_keys(hits.face, hits.side, tracing.surfaces.of_face, tracing.surfaces.both,
+                       tracing.surfaces.number, begin + left, keys[own, left : left + some])  # fmt: skip
     return keys
 
 
-def _targets_of(
-    tracing: Tracing, rows: Integers, shifts: NDArray[np.uint64], begin: int, count: int
-) -> Generator[None, None, Integers]:
-    """The targets of some rays of some rows, one row after the other."""
+def _hits_of(tracing: Tracing, rows: Integers, begin: int, count: int) -> Generator[None, None, Hits]:
+    """The hits of the rays from ``begin`` on: the first of each row, then the second of each, and so on."""
     total, (mesh, tree) = len(rows) * count, tracing.built
-    origins, directions = np.empty((2, total, 3))
+    origins, moved, directions = np.empty((3, total, 3))
     faces, codes = np.empty((2, total), np.int64)
-    aim_rows(*tracing.senders, shifts, rows, begin, count, origins, directions, faces, codes)
-    rays = RayBatch(origins, directions, *_EVERYWHERE)
-    batch = offset_origins(rays, Leaving(faces, codes, np.empty((0, 3))), mesh, tree.scale, 1)
-    hits = yield from _closest(tracing, batch)
+    aim_rows(*tracing.senders, rays_from(begin, count), rows, origins, directions, faces, codes)
+    starts = make_starts(total, mesh)
+    leaving, own = Leaving(faces, codes, np.empty((0, 3))), starts[HEAD:].view(np.float64).reshape(total, ROW)
+    # None is too far from its face: it was placed there.
+    offset_from_faces(mesh.vertices, mesh.faces, origins, directions, leaving, moved, own, 0, total, tree.scale)
+    hits = yield from _closest(tracing, RayBatch(moved, directions, *_EVERYWHERE, starts))
     if tracing.surfaces.transmittance.any():
-        yield from _pass_through(tracing, hits, directions, shifts, begin)
-    return _targets_at(tracing.surfaces, hits)
+        yield from _pass_through(tracing, hits, directions, rows, begin)
+    return hits
 
 
 def _closest(tracing: Tracing, rays: RayBatch) -> Generator[None, None, Hits]:
@@ -188,16 +201,14 @@ def _closest(tracing: Tracing, rays: RayBatch) -> Generator[None, None, Hits]:
     return Hits(t, face, u, v, mesh, None, side, pile)
 
 
-def _pass_through(
-    tracing: Tracing, hits: Hits, directions: Floats, shifts: NDArray[np.uint64], begin: int
-) -> Iterator[None]:
+def _pass_through(tracing: Tracing, hits: Hits, directions: Floats, rows: Integers, begin: int) -> Iterator[None]:
     """Let rays go on through the faces that they hit, as often as these let a share through; ``hits`` is changed.
 
     A ray goes on whole or not at all, by a number of its own, so that rows are counts.
     """
     mesh, tree = tracing.built
-    count = len(directions) // len(shifts)
-    numbers = (shifts[:, :1] + np.arange(begin, begin + count, dtype=np.uint64)).reshape(-1)
+    numbered = np.arange(begin, begin + len(directions) // len(rows), dtype=np.uint64)
+    numbers = ((numbered << np.uint64(32))[:, None] + rows.astype(np.uint64)).reshape(-1)
     rays = np.flatnonzero(hits.face >= 0)
     while len(rays):
         numbers[rays] = mixed(numbers[rays] + WEYL)
@@ -224,15 +235,3 @@ def _columns(hits: Hits) -> tuple[NDArray[np.generic], ...]:
     side, pile = hits.side, hits._pile
     assert side is not None and pile is not None
     return hits.t, hits.face, hits.u, hits.v, side, pile
-
-
-def _targets_at(surfaces: Surfaces, hits: Hits) -> Integers:
-    """The surface that each ray ends on; beyond them the sky, and backs that do not receive."""
-    number, side = surfaces.number, hits.side
-    assert side is not None
-    targets = surfaces.of_face[hits.face]
-    # rule: sky-of-row
-    targets[hits.face < 0] = number + SKY
-    # rule: backs-of-faces
-    targets[(side < 0) & ~surfaces.both[hits.face]] = number + BACK
-    return targets

@@ -5,25 +5,51 @@ import math
 from renderer.jit.decorators import kernel
 from renderer.studies.factors.aim import REPLICATES
 
+# Targets after the last surface.
+SKY, BACK = 0, 1
 # A count is a whole number: no entry is known better than half a ray.
 _HALF = 0.5
 
 
 @kernel
-def tally_rows(keys, known_first, known, most, rtol, targets, counts, errors, lengths, unfinished):
-    """Count the hits of some rows.
+def write_keys(faces, sides, of_face, both, number, begin, keys):
+    """Write the keys of ``tally_rows`` for the rays from ``begin`` on of some rows.
+
+    faces, sides   (n * rows,) int64: what each ray hit, -1 for nothing, and from which side; the first ray of each row,
+                   then the second of each, and so on
+    of_face, both  as of ``Surfaces``; ``number`` of them
+    keys           (rows, n) int64
+    """
+    rows, count = keys.shape
+    for k in range(count):
+        for row in range(rows):
+            face = faces[k * rows + row]
+            # rule: sky-of-row
+            target = number + SKY
+            if face >= 0:
+                # rule: backs-of-faces
+                target = of_face[face] if sides[k * rows + row] > 0 or both[face] else number + BACK
+            keys[row, k] = target * REPLICATES + (begin + k) % REPLICATES
+
+
+@kernel
+def tally_rows(keys, known_first, known, most, rtol, last, targets, counts, errors, lengths, unfinished):
+    """Count the hits of some rows, and write those of the rows that need no more rays, one row after the other.
 
     keys         (rows, n) int64, sorted: target * REPLICATES + the number of the sequence that the ray belongs to
     known_first  (rows + 1,) int64, known (...) int64: the targets of each row, sorted, that need no rays
     most         (rows,) float64: the largest entry of each row that needs no rays
     rtol         as of ``view_factors``
+    last         whether no row gets more rays
     targets, counts, errors
-                 (rows * n,): the targets of each row that do, from row * n on; how many rays hit them; the standard
-                 error of that number over n
+                 (rows * n,): the targets of each row that do; how many rays hit them; the standard error of that number
+                 over n
     lengths      (rows,) int64: how many targets they are
     unfinished   (rows,) bool: whether an error is larger than rtol times the largest entry
+
+    Returns how many targets are written.
     """
-    rays = keys.shape[1]
+    rays, written = keys.shape[1], 0
     for row in range(len(keys)):
         at, begin, length, largest, worst = known_first[row], 0, 0, most[row], 0.0
         while begin < rays:
@@ -40,8 +66,11 @@ def tally_rows(keys, known_first, known, most, rtol, targets, counts, errors, le
                 # rule: error-of-replicates
                 spread = (squares - float(count) ** 2 / REPLICATES) * REPLICATES / (REPLICATES - 1)
                 error = math.sqrt(max(spread, _HALF * _HALF)) / rays
-                i = row * rays + length
+                i = written + length
                 targets[i], counts[i], errors[i] = target, count, error
                 largest, worst, length = max(largest, count / rays), max(worst, error), length + 1
             begin = end
-        lengths[row], unfinished[row] = length, worst > rtol * largest
+        lengths[row], unfinished[row] = length, worst > rtol * largest and not last
+        if not unfinished[row]:
+            written += length
+    return written
