@@ -75,14 +75,14 @@ class TestRooms:
 def test_closed_forms_hold_and_see_what_is_more_than_allowed(monkeypatch, name):
     row = forms.check(name, True)
     assert row["share_of_allowed"] <= 1.0 and row["share_of_asked"] <= 1.0
-    # What is exact may err by 1e-9; what is not, by eight stated errors.
-    gain = 1.0 + (1e-7 if row["stated"] == 0.0 else 12.0 * row["stated"] / 0.02)
+    # What is exact may err by 1e-9 of the area; what is not, by eight errors, each at most a fiftieth of the largest.
+    gain = 1.0 + (1e-7 if row["stated"] == 0.0 else 0.2)
     wrong(forms, monkeypatch, lambda found: scaled(found, gain))
     assert forms.check(name, True)["share_of_allowed"] > 1.0
 
 
 @cases("name", points.CHECKS)
-def test_points_hold_and_see_a_twentieth(monkeypatch, name):
+def test_points_hold_and_see_a_half(monkeypatch, name):
     assert points.check(name, True)["share_of_allowed"] <= 1.0
     own = points.view_factors_from
 
@@ -95,10 +95,10 @@ def test_points_hold_and_see_a_twentieth(monkeypatch, name):
 
 
 @cases("name", rooms.ROOMS)
-def test_embree_agrees_and_sees_a_fiftieth(monkeypatch, name):
+def test_embree_agrees_and_sees_a_thirtieth(monkeypatch, name):
     row = embree.check(name, True)
     assert row["apart"] <= embree.ERRORS
-    wrong(embree, monkeypatch, lambda found: scaled(found, 0.98))
+    wrong(embree, monkeypatch, lambda found: scaled(found, 0.97))
     assert embree.check(name, True)["apart"] > embree.ERRORS
 
 

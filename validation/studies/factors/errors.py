@@ -29,8 +29,9 @@ def check(name: str, quick: bool) -> dict[str, Any]:
     true, stated = ([float(np.sqrt(np.mean(part**2))) for part in parts] for parts in zip(*curves, strict=True))
     # Over all numbers of rays: of each the mean of squares over that of those stated.
     ratio = float(np.mean([(a / b) ** 2 for a, b in zip(true, stated, strict=True)]))
+    falls = slope(counts, true)
     return {"subject": f"errors of {form.name}", "counts": list(counts), "entries": len(curves[0][0]), "rms": true,
-            "stated": stated, "slope": slope(counts, true), "ratio": ratio}  # fmt: skip
+            "stated": stated, "slope": np.nan if falls is None else falls, "ratio": ratio}  # fmt: skip
 
 
 def _errors(form: Form, count: int) -> tuple[Any, Any]:

@@ -67,7 +67,7 @@ def check(name: str, quick: bool) -> dict[str, Any]:
         chance = ERRORS * float(stated[one, other]) if value else UNSEEN / max(int(found.rays[one]), 1)
         errors.append(beyond)
         shares.append(beyond / (ROUNDING + (chance if found.rays[one] else 0.0)))
-    largest = found.matrix.max(axis=1).toarray().ravel()
+    largest = found.matrix.toarray().max(axis=1)
     asked = stated.max(axis=1) / np.where(largest > 0.0, rtol * largest, np.inf)
     return {"subject": form.name, "source": form.source, "entries": len(form.entries), "error": max(errors),
             "stated": float(max((stated[e.one, e.other] for e in form.entries), default=0.0)),
