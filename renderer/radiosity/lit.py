@@ -31,8 +31,8 @@ Ints = NDArray[np.int64]
 
 # Patches along the longest side of the scene by default: of a room some thousands in all, which take seconds.
 _ALONG = 24
-# The share of all light that may end on backs of faces. Below it is what lies hidden beneath objects on a floor.
-_ON_BACKS = 0.1
+# The share of all light that may end on backs of faces: floors under what stands on them, plates without a thickness.
+_ON_BACKS = 0.25
 
 
 class _Part(NamedTuple):

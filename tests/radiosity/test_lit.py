@@ -89,11 +89,11 @@ def test_shadows_are_where_render_has_them() -> None:
     materials = {"clay": Phong(diffuse=1e-6), "plate": Phong(diffuse=1e-6)}
     scene = scene_of({"clay": GROUND, "plate": plate}, materials, lights=[light])
     below = OrthographicCamera(eye=(0.3, 0.4, 0), target=(0.3, 0, 0), up=(0, 0, -1), height=1.4)
-    ours, sound = (1e6 * seen(s, camera=below, resolution=56)[..., 0] for s in (lit_scene(scene, 0.06), scene))
-    shade = np.lib.stride_tricks.sliding_window_view(sound, (7, 7))
-    same = np.abs(shade - shade[..., 3:4, 3:4]).max(axis=(2, 3)) < 1e-6  # three pixels are longer than an edge
-    assert 0.2 < (sound[3:-3, 3:-3][same] == 0).mean() < 0.8
-    assert np.abs(ours - sound)[3:-3, 3:-3][same].max() < 1e-3
+    ours, sound = (1e6 * seen(s, camera=below, resolution=56)[..., 0] for s in (lit_scene(scene, 0.1), scene))
+    shade = np.lib.stride_tricks.sliding_window_view(sound, (11, 11))
+    same = np.abs(shade - shade[..., 5:6, 5:6]).max(axis=(2, 3)) < 1e-6  # five pixels are longer than an edge
+    assert 0.1 < (sound[5:-5, 5:-5][same] == 0).mean() < 0.9
+    assert np.abs(ours - sound)[5:-5, 5:-5][same].max() < 1e-3
 
 
 def test_a_background_lights_by_what_is_seen_of_it() -> None:
@@ -102,7 +102,7 @@ def test_a_background_lights_by_what_is_seen_of_it() -> None:
     # Walls so dark that the floor has the sky's light alone, over its whole area that of the opposite square.
     scene = scene_of({"clay": well}, {"clay": Phong(diffuse=1e-6)}, background=(1, 2, 4))
     below = OrthographicCamera(eye=(0, 1, 0), target=(0, 0, 0), up=(0, 0, -1), height=2)
-    floor = 1e6 * seen(lit_scene(scene, 0.25, rtol=0.005), camera=below).mean(axis=(0, 1))
+    floor = 1e6 * seen(lit_scene(scene, 0.25), camera=below).mean(axis=(0, 1))
     # Howell C-11, for a cube; means over pixels are not those over patches.
     assert np.allclose(floor, 0.19982 * np.array([1, 2, 4]), rtol=0.02)
 
@@ -192,11 +192,10 @@ def test_ambient_light_and_absent_shadows_are_named() -> None:
 def test_walls_that_are_turned_away_are_named() -> None:
     room = scene_of({"clay": turned(shapes.box())}, {"clay": Phong()})
     lit_scene(room, 0.5)
-    ball = scene_of(
-        {"clay": turned(shapes.box()), "lamp": turned(shapes.icosphere(1))}, {"clay": Phong(), "lamp": Phong()}
-    )
+    inner = shapes.box((0.1, 0.1, 0.1), (0.9, 0.9, 0.9))
+    lined = scene_of({"clay": turned(shapes.box()), "lining": turned(inner)}, {"clay": Phong(), "lining": Phong()})
     with pytest.warns(SceneWarning, match="ends on backs of faces"):
-        lit_scene(ball, 0.5)
+        lit_scene(lined, 0.5)
 
 
 @cases(
