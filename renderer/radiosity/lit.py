@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.arguments.arrays import real_argument
 from renderer.arguments.fields import SceneWarning
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
@@ -113,6 +114,8 @@ def lit_scene(
     [[1.0, 1.0, 1.0], [1.0, 1.0, 1.0]]
     """
     expect(isinstance(scene, Scene), "scene", "a renderer.Scene", type(scene).__name__)
+    angle = real_argument("crease", crease)
+    expect(angle.ndim == 0 and 0.0 <= float(angle) <= 180.0, "crease", "an angle from 0 to 180 degrees", repr(crease))
     check_reflectance(scene)
     for line in left_out(scene):
         warnings.warn(f"radiosity leaves out {line}", SceneWarning, stacklevel=2)

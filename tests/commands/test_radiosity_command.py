@@ -180,11 +180,11 @@ def test_progress_is_shown_unless_quiet(folder: Path, monkeypatch: pytest.Monkey
         (["-o", "a.png", "-o", "a.png"], "each once"),
         (["-o", "a.npy", "--tone", "aces"], "--tone: expected a .png file"),
         (["-o", "a.npy", "--edge", "0"], "edge: expected"),
-        (["-o", "a.npy", "--rtol", "-1"], "rtol: expected"),
-        (["-o", "a.npy", "--max-rays", "3"], "max_rays: expected"),
+        (["-o", "a.npy", "--edge", "1", "--rtol", "-1"], "rtol: expected"),
+        (["-o", "a.npy", "--edge", "1", "--max-rays", "3"], "max_rays: expected"),
         (["-o", "a.npy", "--crease", "-3"], "crease: expected"),
         (["-o", "a.npy", "--threads", "0"], "threads: expected"),
-        (["-o", "a.npy", "--edge", "0.5", "--samples", "3"], "samples: expected"),
+        (["-o", "a.npy", "--samples", "3"], "samples: expected"),
     ],
 )
 def test_bad_input_is_one_line(folder: Path, capsys: pytest.CaptureFixture[str], words: list[str], says: str) -> None:

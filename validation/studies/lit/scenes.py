@@ -53,7 +53,7 @@ def yard() -> Scene:
 
 # Each with the longest edge of its patches, and of those of a short run.
 LIT: dict[str, tuple[Callable[[], Scene], float, float]] = {
-    "the Cornell box by radiosity": (cornell, 24.0, 40.0),
-    "a room by radiosity": (room, 0.06, 0.1),
-    "a yard by radiosity": (yard, 0.12, 0.2),
+    "the Cornell box by radiosity": (cornell, 40.0, 60.0),
+    "a room by radiosity": (room, 0.15, 0.25),
+    "a yard by radiosity": (yard, 0.2, 0.3),
 }
