@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.studies.factors.balance import Exchanges, balanced
+from renderer.studies.factors.balance import Exchanges, balanced, rows_of
 from renderer.studies.factors.known import KnownPairs
 from renderer.studies.factors.result import ViewFactors, csr_array
 from renderer.studies.factors.rows import RowHits
@@ -23,63 +23,66 @@ _LITTLE = 1e-9
 
 
 class _Counted(NamedTuple):
-    """The entries that rays counted, each surface pair once: rows <= columns."""
+    """The entries that rays counted, on and above the diagonal: values, freedom and variance of each."""
 
-    rows: Integers
-    columns: Integers
-    values: Floats
+    values: csr_array
     freedom: Floats
     variance: Floats
 
 
-def _counted(hits: RowHits, areas: Floats) -> _Counted:
-    """The exchanges of pairs by the rays of both: their hits over the rays by area of both."""
-    number = len(areas)
-    inner = hits.targets < number
-    rows, columns, counts = hits.rows[inner], hits.targets[inner], hits.counts[inner]
-    density = hits.rays / areas
-    # The error of a row's own estimate, weighed as its rays are.
-    spread = (hits.errors[inner] * hits.rays[rows]) ** 2
-    low, high = np.minimum(rows, columns), np.maximum(rows, columns)
-    order = np.argsort(low * number + high, kind="stable")
-    low, high = low[order], high[order]
-    begins = np.flatnonzero(np.diff(low * number + high, prepend=-1))
-    low, high = low[begins], high[begins]
-    both = np.where(low == high, density[low], density[low] + density[high])
-    # rule: reciprocal-exchange
-    values = np.add.reduceat(counts[order].astype(np.float64), begins) / both if len(begins) else np.empty(0)
-    variance = np.add.reduceat(spread[order], begins) / both**2 if len(begins) else np.empty(0)
-    return _Counted(low, high, values, 1.0 / both, variance)
-
-
 def assembled(areas: Floats, pairs: KnownPairs, hits: RowHits) -> ViewFactors:
-    """The result: exact and counted entries, balanced."""
+    """The view factors of surfaces: exact and counted entries, balanced."""
     number, counted = len(areas), _counted(hits, areas)
     sky, backs = areas * hits.share(number + SKY), areas * hits.share(number + BACK)
     outside_freedom = np.divide(areas, hits.rays, out=np.zeros(number), where=hits.rays > 0)
-    rows, columns = np.concatenate([pairs.rows, counted.rows]), np.concatenate([pairs.columns, counted.columns])
-    values = np.concatenate([pairs.values, counted.values])
-    freedom = np.concatenate([np.zeros(len(pairs.rows)), counted.freedom])
-    variance = np.concatenate([np.zeros(len(pairs.rows)), counted.variance])
-    given = Exchanges(rows, columns, values, freedom, sky + backs, outside_freedom)
-    found = balanced(given, areas)
+    upper, freedom, variance = _together(pairs, counted)
+    found = balanced(Exchanges(upper, freedom, sky + backs, outside_freedom), areas)
     # What rays alone cannot fill: exact entries change as little as that leaves open.
     found = balanced(found._replace(freedom=np.maximum(freedom, _LITTLE * areas.mean())), areas)
     share = np.divide(found.outside, sky + backs, out=np.zeros(number), where=sky + backs > 0.0)
     warn_of_backs(backs * share / areas)
-    used = found.values > 0.0
-    rows, columns, values, variance = rows[used], columns[used], found.values[used], variance[used]
-    exchange = _symmetric(rows, columns, values, number)
-    errors = _symmetric(rows, columns, np.sqrt(variance), number)
-    errors.data /= np.repeat(areas, np.diff(errors.indptr))
+    errors = type(upper)((np.sqrt(variance), upper.indices, upper.indptr), shape=upper.shape)
+    exchange, errors = _symmetric(found.upper), _symmetric(errors)
+    errors.data /= areas[rows_of(errors)]
     return ViewFactors(areas, exchange, sky * share / areas, backs * share / areas, errors, hits.rays)
 
 
-def _symmetric(rows: Integers, columns: Integers, values: Floats, number: int) -> csr_array:
-    """The symmetric matrix of entries with rows <= columns."""
-    beside = rows != columns
-    places = np.concatenate([rows, columns[beside]]), np.concatenate([columns, rows[beside]])
-    return scipy_sparse().csr_array((np.concatenate([values, values[beside]]), places), shape=(number, number))
+def _counted(hits: RowHits, areas: Floats) -> _Counted:
+    """The exchanges of pairs by the rays of both: their hits over the rays by area of both."""
+    number, density = len(areas), hits.rays / areas
+    inner = hits.targets < number
+    rows, targets = hits.rows[inner], hits.targets[inner]
+
+    def both_of(entries: Floats) -> csr_array:
+        one = scipy_sparse().csr_array((entries, (rows, targets)), shape=(number, number))
+        return scipy_sparse().triu(one + one.T, format="csr")
+
+    # rule: reciprocal-exchange
+    values = both_of(hits.counts[inner].astype(np.float64))
+    both = density[rows_of(values)] + density[values.indices]
+    # The error of a row's own estimate, weighed as its rays are. On the diagonal, both rows are one.
+    variance = both_of((hits.errors[inner] * hits.rays[rows]) ** 2).data / both**2
+    once = np.where(rows_of(values) == values.indices, 2.0, 1.0)
+    values.data /= both
+    return _Counted(values, once / both, once * variance)
+
+
+def _together(pairs: KnownPairs, counted: _Counted) -> tuple[csr_array, Floats, Floats]:
+    """Exact and counted entries as one matrix, with freedom and variance: no entry is both."""
+    values, exact = counted.values, np.zeros(len(pairs.rows))
+    rows = np.concatenate([pairs.rows, rows_of(values)])
+    columns = np.concatenate([pairs.columns, values.indices])
+    order = np.lexsort((columns, rows)) if len(pairs.rows) else slice(None)
+    entries = np.concatenate([pairs.values, values.data])[order]
+    first = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=values.shape[0]))])
+    upper = type(values)((entries, columns[order], first), shape=values.shape)
+    freedom, variance = np.concatenate([exact, counted.freedom]), np.concatenate([exact, counted.variance])
+    return upper, freedom[order], variance[order]
+
+
+def _symmetric(upper: csr_array) -> csr_array:
+    """The whole matrix, and only entries that are not 0 or have an error."""
+    return upper + scipy_sparse().triu(upper, k=1, format="csr").T
 
 
 def warn_of_backs(backs: Floats) -> None:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.studies.factors.result import csr_array
 from renderer.studies.factors.sparse import scipy_sparse
 
 Floats = NDArray[np.float64]
@@ -24,16 +25,13 @@ _MOST = 1.0
 class Exchanges(NamedTuple):
     """Symmetric exchanges of n surfaces: the entries on and above the diagonal, and those with what is no surface.
 
-    rows, columns    (k,) int64: rows <= columns
-    values           (k,) float64, >= 0
+    upper            (n, n) csr_array of k entries >= 0
     freedom          (k,) float64, >= 0: by what share each may change beside others; 0 for one that is exact
     outside          (n,) float64, >= 0: the exchange of each row with the sky and with backs
     outside_freedom  (n,) float64
     """
 
-    rows: Integers
-    columns: Integers
-    values: Floats
+    upper: csr_array
     freedom: Floats
     outside: Floats
     outside_freedom: Floats
@@ -45,16 +43,19 @@ def balanced(exchanges: Exchanges, areas: Floats) -> Exchanges:
     An entry is multiplied by exp(freedom * (m_i + m_j)), with a number m for each row, so it stays symmetric, and not
     negative. Where no numbers give these sums, they are as near as the steps come.
     """
-    rows, columns, _, freedom, _, outside_freedom = exchanges
-    count, levels, on_diagonal = len(areas), np.zeros(len(areas)), rows == columns
+    upper, freedom, outside, outside_freedom = exchanges
+    rows, columns, levels = rows_of(upper), upper.indices, np.zeros(len(areas))
+    on_diagonal = rows == columns
 
     def sums(entries: Floats, others: Floats) -> Floats:
-        ends = np.bincount(rows, entries, count) + np.bincount(columns, np.where(on_diagonal, 0.0, entries), count)
-        return ends + others
+        part = _with(upper, entries)
+        ends = part.sum(axis=1) + part.sum(axis=0) - part.diagonal()
+        return np.asarray(ends + others)
 
-    found, least = (exchanges.values, exchanges.outside), np.inf
+    found, least = (upper.data, outside), np.inf
     for _ in range(_STEPS):
-        now, open_now = _at(exchanges, levels)
+        now = upper.data * np.exp(freedom * (levels[rows] + levels[columns]))
+        open_now = outside * np.exp(outside_freedom * levels)
         slopes = now * freedom
         diagonal = sums(np.where(on_diagonal, 2.0, 1.0) * slopes, open_now * outside_freedom)
         missing = np.where(diagonal > 0.0, areas - sums(now, open_now), 0.0)
@@ -64,28 +65,27 @@ def balanced(exchanges: Exchanges, areas: Floats) -> Exchanges:
         found, least = (now, open_now), worst
         if worst <= _EXACT:
             break
-        step = _step(rows, columns, np.where(on_diagonal, 0.0, slopes), diagonal, missing)
+        step = _step(_with(upper, np.where(on_diagonal, 0.0, slopes)), diagonal, missing)
         change = max(np.abs(freedom * (step[rows] + step[columns])).max(initial=0.0), _MOST)
         levels += step * (_MOST / change)
-    return exchanges._replace(values=found[0], outside=found[1])
+    return exchanges._replace(upper=_with(upper, found[0]), outside=found[1])
 
 
-def _at(exchanges: Exchanges, levels: Floats) -> tuple[Floats, Floats]:
-    """Values and outside at some numbers of the rows."""
-    changes = exchanges.freedom * (levels[exchanges.rows] + levels[exchanges.columns])
-    return exchanges.values * np.exp(changes), exchanges.outside * np.exp(exchanges.outside_freedom * levels)
+def rows_of(matrix: csr_array) -> Integers:
+    """The row of each entry."""
+    return np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
 
 
-def _step(rows: Integers, columns: Integers, slopes: Floats, diagonal: Floats, missing: Floats) -> Floats:
+def _with(matrix: csr_array, entries: Floats) -> csr_array:
+    """A matrix with other entries at the same places."""
+    return type(matrix)((entries, matrix.indices, matrix.indptr), shape=matrix.shape)
+
+
+def _step(slopes: csr_array, diagonal: Floats, missing: Floats) -> Floats:
     """The step of Newton's method; a row of which nothing may change has none."""
-    sparse, count = scipy_sparse(), len(missing)
-    upper = sparse.csr_array((slopes, (rows, columns)), shape=(count, count))
+    linalg, count, lower = scipy_sparse().linalg, len(missing), slopes.T
     inverse = np.divide(1.0, diagonal, out=np.zeros(count), where=diagonal > 0.0)
-
-    def times(x: Floats) -> Floats:
-        return np.asarray(upper @ x + upper.T @ x + diagonal * x)
-
-    operator = sparse.linalg.LinearOperator((count, count), times)
-    guess = sparse.linalg.LinearOperator((count, count), lambda x: inverse * x)
-    found, _ = sparse.linalg.cg(operator, missing, rtol=_STEP_ERROR, maxiter=_STEP_ITERATIONS, M=guess)
+    operator = linalg.LinearOperator((count, count), lambda x: slopes @ x + lower @ x + diagonal * x)
+    guess = linalg.LinearOperator((count, count), lambda x: inverse * x)
+    found, _ = linalg.cg(operator, missing, rtol=_STEP_ERROR, maxiter=_STEP_ITERATIONS, M=guess)
     return np.asarray(found)

@@ -61,8 +61,8 @@ def view_factors(
         The share of a ray, from 0 to 1, that each face lets through: of trees, shades and screens. Faces that let
         something through send and receive on both sides.
     rtol : float, default 0.02
-        Rays are added to a surface until the standard error of each of its view factors is at most `rtol` times the
-        largest of them.
+        Rays are added to a surface until the standard errors of all its view factors together, the root of the sum of
+        their squares, are at most `rtol`: the share of what it sends that may arrive elsewhere.
     max_rays : int, default 65536
         Of a surface, from 256 to 2^24.
     threads : int, optional
@@ -123,7 +123,7 @@ def view_factors(
     pairs = _known_pairs(tracing)
     left = surfaces.areas - pairs.sums(surfaces.number) > _WHOLE * surfaces.areas
     rows = np.flatnonzero(left)
-    hits = trace_rows(tracing, rows, pairs.known(surfaces.areas))
+    hits = trace_rows(tracing, rows, pairs.known(surfaces.number))
     return assembled(surfaces.areas, pairs, _spread(hits, rows, surfaces.number))
 
 

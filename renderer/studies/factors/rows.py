@@ -36,12 +36,12 @@ _EVERYWHERE = (np.zeros(1), np.full(1, np.inf))
 class Known(NamedTuple):
     """The entries of rows that need no rays, as compressed rows.
 
-    first    (n + 1,) int64; targets (k,) int64, sorted in each row; largest (n,) float64: the largest entry of each row
+    first    (n + 1,) int64
+    targets  (k,) int64, sorted in each row
     """
 
     first: Integers
     targets: Integers
-    largest: Floats
 
 
 class RowHits(NamedTuple):
@@ -86,7 +86,7 @@ class Tracing(NamedTuple):
 
 def nothing_known(rows: int) -> Known:
     """``Known`` of no entries."""
-    return Known(np.zeros(rows + 1, np.int64), np.empty(0, np.int64), np.zeros(rows))
+    return Known(np.zeros(rows + 1, np.int64), np.empty(0, np.int64))
 
 
 def trace_rows(tracing: Tracing, rows: Integers, known: Known) -> RowHits:
@@ -132,7 +132,6 @@ def _tally(keys: Integers, rows: Integers, known: Known, rtol: float, last: bool
         keys,
         first,
         np.concatenate(spans),
-        known.largest[rows],
         rtol,
         last,
         targets,

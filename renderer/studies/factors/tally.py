@@ -33,25 +33,24 @@ def write_keys(faces, sides, of_face, both, number, begin, keys):
 
 
 @kernel
-def tally_rows(keys, known_first, known, most, rtol, last, targets, counts, errors, lengths, unfinished):
+def tally_rows(keys, known_first, known, rtol, last, targets, counts, errors, lengths, unfinished):
     """Count the hits of some rows, and write those of the rows that need no more rays, one row after the other.
 
     keys         (rows, n) int64, sorted: target * REPLICATES + the number of the sequence that the ray belongs to
     known_first  (rows + 1,) int64, known (...) int64: the targets of each row, sorted, that need no rays
-    most         (rows,) float64: the largest entry of each row that needs no rays
     rtol         as of ``view_factors``
     last         whether no row gets more rays
     targets, counts, errors
                  (rows * n,): the targets of each row that do; how many rays hit them; the standard error of that number
                  over n
     lengths      (rows,) int64: how many targets they are
-    unfinished   (rows,) bool: whether an error is larger than rtol times the largest entry
+    unfinished   (rows,) bool: whether the root of the sum of the squared errors is above rtol
 
     Returns how many targets are written.
     """
     rays, written = keys.shape[1], 0
     for row in range(len(keys)):
-        at, begin, length, largest, worst = known_first[row], 0, 0, most[row], 0.0
+        at, begin, length, variance = known_first[row], 0, 0, 0.0
         while begin < rays:
             target, end, squares = keys[row, begin] // REPLICATES, begin, 0.0
             while end < rays and keys[row, end] // REPLICATES == target:
@@ -68,9 +67,9 @@ def tally_rows(keys, known_first, known, most, rtol, last, targets, counts, erro
                 error = math.sqrt(max(spread, _HALF * _HALF)) / rays
                 i = written + length
                 targets[i], counts[i], errors[i] = target, count, error
-                largest, worst, length = max(largest, count / rays), max(worst, error), length + 1
+                variance, length = variance + error * error, length + 1
             begin = end
-        lengths[row], unfinished[row] = length, worst > rtol * largest and not last
+        lengths[row], unfinished[row] = length, variance > rtol * rtol and not last
         if not unfinished[row]:
             written += length
     return written

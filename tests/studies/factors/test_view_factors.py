@@ -111,14 +111,16 @@ def test_a_ball_in_a_ball():
 def test_a_sphere_sees_itself_by_the_share_of_its_area():
     """From any face of a sphere seen from within, each part of it has the share of its area (Howell C-120).
 
-    The faces of the polyhedron are 1/32 of a radius off the sphere at most, which errs by as much.
+    The faces of the polyhedron are 1/32 of a radius off the sphere at most, and seen from there
+    their size errs by up to a tenth.
     """
     mesh = icosphere(2)
-    found = view_factors(inward(mesh), rtol=0.2)
+    found = view_factors(inward(mesh), rtol=0.02)
     check_laws(found)
     shares = found.areas / found.areas.sum()
     far = ~np.isin(mesh.faces, mesh.faces[0]).any(axis=1)
-    np.testing.assert_allclose(found.matrix.toarray()[0, far], shares[far], rtol=0.3)
+    off = np.abs(found.matrix.toarray()[0, far] - shares[far])
+    assert (off < 5.0 * found.errors.toarray()[0, far] + 0.1 * shares[far]).all()
 
 
 @cases("share", [0.0, 0.25, 0.75])
@@ -127,7 +129,7 @@ def test_a_screen_lets_its_share_through(share):
     plates = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
     wide = 4.0 * (plates - [0.5, 0.5, 0]) + [0.5, 0.5, 0.5]
     faces = np.array([[0, 1, 2], [0, 2, 3]])
-    vertices, faces = joined((plates, faces), (plates + [0, 0, 1], faces[:, ::-1]), (wide, faces))
+    vertices, faces = joined((plates, faces), (plates + np.eye(3)[2], faces[:, ::-1]), (wide, faces))
     groups = np.repeat([0, 1, 2], 2)
     found = view_factors(
         Octree(vertices, faces), groups, transmittance=np.where(groups == 2, share, 0.0), rtol=0.01, sides="both"
@@ -142,7 +144,7 @@ def test_backs_are_counted_apart_with_a_warning():
     """Two plates face each other; one of them is turned away."""
     plates = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
     faces = np.array([[0, 1, 2], [0, 2, 3]])
-    vertices, faces = joined((plates, faces), (plates + [0, 0, 1], faces))
+    vertices, faces = joined((plates, faces), (plates + np.eye(3)[2], faces))
     octree, groups = Octree(vertices, faces), [0, 0, 1, 1]
     with pytest.warns(UserWarning, match="surface 0 most"):
         found = view_factors(octree, groups)
