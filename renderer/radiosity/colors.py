@@ -64,15 +64,22 @@ def vertex_colors(
 
     Examples
     --------
+    The corners where the two faces of a square meet have the mean; the two others their face's own grey.
+
     >>> import numpy as np
     >>> from renderer.mesh.shapes import box, grid
     >>> from renderer.radiosity import vertex_colors
-    >>> vertex_colors(grid(), [0.0, 1.0], space="linear").colors[:, 0]
-    array([0.5, 0. , 0.5, 1. ], dtype=float32)
+    >>> print(vertex_colors(grid(), [0.0, 1.0], space="linear").colors)
+    [[0.5 0.5 0.5]
+     [0.  0.  0. ]
+     [0.5 0.5 0.5]
+     [1.  1.  1. ]]
+
+    Sides of a box do not blend.
+
     >>> sides = np.repeat([0.0, 0.2, 0.4, 0.6, 0.8, 1.0], 2)
-    >>> colored = vertex_colors(box(), sides, space="linear")
-    >>> len(colored.vertices), np.unique(colored.colors).round(1).tolist()
-    (24, [0.0, 0.20000000298023224, 0.4000000059604645, 0.6000000238418579, 0.800000011920929, 1.0])
+    >>> len(vertex_colors(box(), sides).vertices)
+    24
     """
     expect(isinstance(mesh, Mesh), "mesh", "a renderer.Mesh", type(mesh).__name__)
     rows = _check_values(values, len(mesh.faces))

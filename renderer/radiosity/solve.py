@@ -38,9 +38,13 @@ class Balance(NamedTuple):
 
     Examples
     --------
-    >>> from renderer.radiosity import Balance
-    >>> Balance(emitted=3.0, from_sky=1.0, absorbed=2.0, to_sky=1.5, to_backs=0.0).error
-    0.5
+    >>> from renderer import Octree
+    >>> from renderer.mesh.shapes import box
+    >>> from renderer.radiosity import radiosity
+    >>> from renderer.studies import view_factors
+    >>> balance = radiosity(view_factors(Octree.from_mesh(box())), emission=1.0, reflectance=0.5).balance
+    >>> balance.emitted, balance.to_sky
+    (array([6., 6., 6.]), array([6., 6., 6.]))
     """
 
     emitted: Floats
@@ -55,9 +59,12 @@ class Balance(NamedTuple):
 
         Examples
         --------
-        >>> from renderer.radiosity import Balance
-        >>> Balance(emitted=3.0, from_sky=1.0, absorbed=2.0, to_sky=2.0, to_backs=0.0).error
-        0.0
+        >>> from renderer import Octree
+        >>> from renderer.mesh.shapes import box
+        >>> from renderer.radiosity import radiosity
+        >>> from renderer.studies import view_factors
+        >>> radiosity(view_factors(Octree.from_mesh(box())), emission=1.0, reflectance=0.5).balance.error
+        array([0., 0., 0.])
         """
         return (self.emitted + self.from_sky) - (self.absorbed + self.to_sky + self.to_backs)
 

@@ -63,7 +63,7 @@ def solved(system: System, amplification: float, rtol: float, max_iterations: in
     Raises ``ValueError`` naming ``rtol`` if rounding alone exceeds that, or ``max_iterations`` if there are not enough.
     """
     operator, wanted, weights = _symmetric(system)
-    z, iterations, tolerance = np.zeros(wanted.size), 0, rtol / amplification
+    z, iterations, tolerance = np.zeros(wanted.size), 0, rtol
     while True:
         z, used = _iterate(operator, wanted, z, tolerance, max_iterations - iterations)
         iterations += used
@@ -143,11 +143,11 @@ def _iterate(operator: object, wanted: Floats, start: Floats, tolerance: float, 
 
 
 def _with_bound(system: System, returned: Floats, amplification: float, iterations: int) -> Solution:
-    """The solution from B - E' as found. Gathering once more replaces it by a better one."""
-    exchange, source, rho = system.exchange, system.source, system.reflectance
-    values = source + rho * _gathered(exchange, np.maximum(source + returned, 0.0))
+    """The solution from B - E' as found, which the exact one has nowhere below 0."""
+    exchange, source = system.exchange, system.source
+    values = source + np.maximum(returned, 0.0)
     gathered = _gathered(exchange, values)
-    residual = float(np.abs((source - values) + rho * gathered).max(initial=0.0))
+    residual = float(np.abs((source - values) + system.reflectance * gathered).max(initial=0.0))
     # rule: proven-bound
     bound = (residual + _rounding(exchange, float(values.max(initial=0.0)))) * amplification
     return Solution(values, gathered, residual, bound, iterations)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from cases import cases
 
+from renderer import Mesh
 from renderer.mesh.shapes import box, grid
 from renderer.radiosity import adaptive, patches, radiosity
 from renderer.studies.factors.surfaces import areas_of
@@ -44,6 +45,18 @@ def test_a_shadow_is_cut_and_what_is_even_is_not():
     mean = np.average(values, weights=areas_of(mesh))
     assert longest_at(coarse, lambda at: np.abs(at[:, 0] - 0.1) < 0.02).max() * 0.3 / np.sqrt(2) <= 0.5 * mean * whole
     assert len(values) < 2000
+
+
+def test_a_lamp_elsewhere_changes_no_cut():
+    """Only reflected light is what changes are compared with."""
+    slope = under_a_sky(lambda at: np.clip(at[:, 0] + 0.5, 0.0, 1.0))
+    two = Mesh.concatenate(grid(2, 2), grid(1, 1).transformed([[1, 0, 0, 9], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]))
+    dark, lit = (np.repeat([0.0, lamp], [8, 2]) for lamp in (0.0, 1e6))
+    cuts = [
+        adaptive(patches(two, 1.5), emission, 0.5, sky=1.0, factors=slope).patches.faces for emission in (dark, lit)
+    ]
+    assert len(cuts[0]) > 10
+    np.testing.assert_array_equal(*cuts)
 
 
 def test_a_slope_is_cut_as_far_as_its_contrast():

@@ -1,6 +1,8 @@
 """Radiosity against closed forms and a dense solution: values, the proven bound, energy, and bad input."""
 
+import re
 from dataclasses import replace
+from fractions import Fraction
 
 import enclosures
 import numpy as np
@@ -9,7 +11,9 @@ from cases import cases
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import aslinearoperator
 
-from renderer.radiosity import radiosity
+from renderer.radiosity import radiosity, system
+from renderer.radiosity.surfaces import check_factors
+from renderer.radiosity.system import System, amplification_of
 
 pytestmark = pytest.mark.judges(
     "radiosity.radiosity", "radiosity.Radiosity", "radiosity.Balance", "radiosity.Balance.error"
@@ -103,6 +107,32 @@ def test_the_error_is_within_its_bound(n, rtol, is_open):
     assert found.bound >= residual
 
 
+def test_the_bound_holds_against_exact_arithmetic():
+    """One surface that sees itself alone: B = E / (1 - rho). A residual may round to 0 beside an error that is not."""
+    rng, residuals = np.random.default_rng(0), []
+    for emission, rho in rng.uniform(0.1, 0.99, (100, 2)):
+        found = radiosity(enclosures.sphere(np.ones(1)), emission, rho, rtol=1e-12)
+        error = abs(Fraction(float(found.values[0, 0])) - Fraction(float(emission)) / (1 - Fraction(float(rho))))
+        assert error <= Fraction(found.bound)
+        residuals.append(found.residual if error else 1.0)
+    assert min(residuals) == 0.0
+
+
+def test_the_inverse_is_bounded_also_where_some_reflect_all():
+    """As adiabatic surfaces do. The bound is of the largest row sum, and not much more."""
+    for seed in range(40):
+        factors, emission, rho, _ = drawn(seed, 12, is_open=seed % 2 == 0)
+        rho = rho[:, :1]
+        if seed % 4 < 2:
+            rho[4:] = 1.0
+        exchange = check_factors(factors)
+        inverse = np.linalg.inv(np.eye(12) - rho * factors.exchange.toarray() / factors.areas[:, None])
+        exact = inverse.sum(axis=1).max()
+        found = amplification_of(System(exchange, emission, rho))
+        assert exact <= found * (1 + 1e-12)
+        assert seed % 4 >= 2 or found <= 2.1 * exact
+
+
 def test_iterations_do_not_grow_with_the_surfaces():
     """Conjugate gradients gain a factor of (k - 1) / (k + 1) an iteration, for k = sqrt of the condition number."""
     for n in (30, 300):
@@ -162,6 +192,30 @@ def test_areas_of_very_different_sizes():
     found = radiosity(factors, [1.0, 0.0, 0.0, 0.0], 0.9, rtol=1e-9)
     mean = areas[0] / areas.sum()
     np.testing.assert_allclose(found.values[:, 0], [1.0 + 9.0 * mean, *(9.0 * mean,) * 3], atol=found.bound)
+
+
+def test_iterations_are_counted_and_limited_over_all_tries(monkeypatch):
+    """With much light to and fro the bound needs more than the first try of conjugate gradients."""
+    factors, emission, _, _ = drawn(8, 30, is_open=False)
+    tries, iterate = [], system._iterate
+
+    def noted(*arguments):
+        tries.append(iterate(*arguments))
+        return tries[-1]
+
+    monkeypatch.setattr(system, "_iterate", noted)
+    whole = radiosity(factors, emission, 0.99999, rtol=1e-6)
+    used = [count for _, count in tries]
+    assert len(used) > 1 and used[-1] > 1 and whole.iterations == sum(used)
+    for most in range(1, sum(used) + 1):
+        try:
+            found = radiosity(factors, emission, 0.99999, rtol=1e-6, max_iterations=most)
+        except ValueError as error:
+            assert re.fullmatch(f"max_iterations: expected more iterations, .*, got {most}", str(error))
+            assert most < sum(used)
+        else:
+            assert used[0] < found.iterations <= most
+    np.testing.assert_array_equal(found.values, whole.values)
 
 
 def test_the_exchange_may_be_an_operator():
