@@ -17,7 +17,7 @@ SHOWN = [v for v in VARIATIONS if v.table["camera"]["type"] in ("perspective", "
 # What the server alone goes by.
 UNTOLD = (
     *("filter", "min_weight", "max_rays", "glass_shadows", "terminator"),
-    *(name for name in UNSEEN if name not in ("emission", "vertex_colors")),
+    *(name for name in UNSEEN if name not in ("emission", "emission_map", "vertex_colors")),
 )
 
 

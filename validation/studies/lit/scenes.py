@@ -2,8 +2,6 @@
 
 from collections.abc import Callable
 
-import numpy as np
-
 from renderer.materials.phong import Phong
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import box, grid
@@ -37,8 +35,7 @@ def room() -> Scene:
 
 def yard() -> Scene:
     """A block on the ground beside a wall, under a uniform sky, the sun and a lamp."""
-    turn = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1.0]])
-    ground = grid(4, 4, (4.0, 4.0)).transformed(turn)
+    ground = grid(4, 4, (4.0, 4.0))
     block = box((-0.4, 0.0, -0.4), (0.4, 0.7, 0.3))
     standing = Mesh(block.vertices, block.faces[block.face_normals()[:, 1] > -0.5])
     materials = {"ground": Phong(diffuse=0.6), "block": Phong(diffuse=(0.7, 0.4, 0.2))}
