@@ -103,5 +103,5 @@ def _write(lit: Any, output: Path, options: argparse.Namespace) -> None:
         return
     chosen = {name: getattr(options, name) for name in ("resolution", "samples", "threads")}
     image = render(lit, **chosen, progress=not options.quiet)
-    tone = options.tone if output.suffix.lower() == ".png" else "srgb"
+    tone: Any = options.tone if output.suffix.lower() == ".png" else "srgb"
     image.toned(tone, exposure=options.exposure).save(output)

@@ -75,7 +75,7 @@ def save_lit(scene: Scene, path: str | os.PathLike[str], *, exposure: float = 0.
     if suffix == ".toml":
         return _save_scene(scene, target)
     mesh, radiance = _whole(scene)
-    bright = exposed(radiance, exposure)
+    bright = exposed(radiance.astype(np.float32), exposure)
     content = _ply(mesh, srgb(bright)) if suffix == ".ply" else _glb(mesh, np.clip(bright, 0.0, 1.0), scene.up)
     write_atomically(target, lambda file: file.write(content))
     return [target]

@@ -44,9 +44,10 @@ def direct_light(octree: Queries, lights: Sequence[Light], faces: Ints, *, progr
 def _light_of(octree: Queries, light: Light, faces: Ints, normals: Floats, corners: Floats) -> Floats:
     """The light of one light at faces with these unit normals (n, 3) and corners (n, 3, 3), (n, 3)."""
     points = np.einsum("pk,nkc->npc", POINTS, corners)
+    falloff: Floats | float = 1.0
     if isinstance(light, DirectionalLight):
         towards: Floats = np.broadcast_to(-unit(light.direction), points.shape)
-        falloff, farthest, color = 1.0, np.inf, light.irradiance
+        farthest, color = np.inf, light.irradiance
     else:
         towards = np.array(light.position) - points
         falloff, farthest, color = _falloff(towards), SHORT_OF_LIGHT, light.intensity

@@ -14,7 +14,7 @@ import make_models  # noqa: E402
 
 from renderer.mesh.load import load_mesh  # noqa: E402
 from renderer.mesh.mesh import Mesh  # noqa: E402
-from renderer.studies.places import face_areas  # noqa: E402
+from renderer.studies.factors.surfaces import areas_of  # noqa: E402
 
 NAMES = ["teapot", "torus_knot", "displaced_sphere", "sphere", "stairs", "block"]
 # A room that is open towards the camera.
@@ -62,5 +62,5 @@ def test_the_cornell_box_is_lit_from_within_and_open_towards_the_camera() -> Non
     joined, _ = room.welded()
     ends = joined.vertices[joined.open_edges]
     assert ((ends[..., 2] == 0).all(axis=1) | (ends[..., 1] == 0).all(axis=1)).all()
-    lamp, wall = (face_areas(load(name)).sum() for name in ("cornell_lamp", "cornell_green"))
+    lamp, wall = (areas_of(load(name)).sum() for name in ("cornell_lamp", "cornell_green"))
     assert np.isclose(lamp, 130 * 105) and np.isclose(wall, 548.8 * 559.2)

@@ -22,6 +22,7 @@ def _grey(sound: Any, mesh: Any, values: Any, **options: Any) -> Any:
 _CHANGES: dict[str, Change] = {
     "lights of patches fall off with the distance": Rule("patch-inverse-square", value("np.cbrt(_) ** 2")),
     "nothing hides lights from patches": Rule("patch-shadows", call("where", "_2")),
+    "nothing hides lamps from patches": Rule("lamp-shadows", call("where", "_2")),
     "surfaces only emit": Wrapped("lit.radiosity", _unlit_by_emission),
     "lit surfaces have no hue": Wrapped("lit.vertex_colors", _grey),
 }

@@ -36,9 +36,8 @@ def global_light(scene: Scene, width: int, height: int, paths: int) -> Estimate:
 
     Raises ``ValueError`` for other materials than diffuse ones, for a sky and for other cameras than a perspective one.
     """
-    _check(scene)
-    made = _scene(scene)
-    sensor = _sensor(scene.camera, width, height)
+    made = _scene(scene, _diffuse(scene))
+    sensor = _sensor(scene, width, height)
     integrator = mi.load_dict({"type": "path", "max_depth": -1})
     each = max(paths // _RUNS, 1)
     runs = np.array([
@@ -47,18 +46,21 @@ def global_light(scene: Scene, width: int, height: int, paths: int) -> Estimate:
     return Estimate(runs.mean(axis=0), runs.std(axis=0, ddof=1) / np.sqrt(_RUNS))
 
 
-def _check(scene: Scene) -> None:
-    if scene.sky is not None or not isinstance(scene.camera, PerspectiveCamera):
-        raise ValueError("scene: expected a perspective camera and a background, got a sky or another camera")
-    for name in sorted({instance.material for instance in scene.instances}):
-        material = scene.materials[name]
+def _diffuse(scene: Scene) -> list[Phong]:
+    """The material of each instance."""
+    found = []
+    for instance in scene.instances:
+        material = scene.materials[instance.material]
         plain = {"type", "diffuse", "emission"}
         if not isinstance(material, Phong) or not material.model_fields_set <= plain:
-            raise ValueError(f"materials.{name}: expected a diffuse one that may emit, got {material}")
+            raise ValueError(f"materials.{instance.material}: expected a diffuse one that may emit, got {material}")
+        found.append(material)
+    return found
 
 
-def _scene(scene: Scene) -> mi.Scene:
-    materials = [scene.materials[instance.material] for instance in scene.instances]
+def _scene(scene: Scene, materials: list[Phong]) -> mi.Scene:
+    if scene.sky is not None:
+        raise ValueError("scene: expected a background, got a sky")
     shapes = mitsuba_scene.meshes(scene, [mitsuba_scene.diffuse(material.diffuse) for material in materials])
     shining = {
         _emitting(shape, materials[index].emission) if any(materials[index].emission) else shape: index
@@ -80,8 +82,11 @@ def _emitting(shape: mi.Mesh, radiance: mitsuba_scene.Rgb) -> mi.Mesh:
     return mitsuba_scene.fill(result, places, faces)
 
 
-def _sensor(camera: PerspectiveCamera, width: int, height: int) -> mi.Sensor:
-    """A sensor with the film of ``camera``; independent samples, and a box filter as ours."""
+def _sensor(scene: Scene, width: int, height: int) -> mi.Sensor:
+    """A sensor with the film of the scene's camera; independent samples, and a box filter as ours."""
+    camera = scene.camera
+    if not isinstance(camera, PerspectiveCamera):
+        raise ValueError(f"camera: expected a perspective one, got {camera.type}")
     place = mi.ScalarTransform4f().look_at(origin=list(camera.eye), target=list(camera.target), up=list(camera.up))
     film = {"type": "hdrfilm", "width": width, "height": height, "rfilter": {"type": "box"}, "pixel_format": "rgb"}
     return mi.load_dict({

@@ -102,7 +102,7 @@ def _without_lamps(scene: Scene) -> NDArray[np.bool_]:
     dark = scene.altered(lights=(), background=0.0)
     shines = render(dark, resolution=_SIZE, samples=16).radiance.max(axis=2) > 0.0
     # And no neighbour of a pixel that does: other samples may.
-    near = np.lib.stride_tricks.sliding_window_view(np.pad(shines, 1), (3, 3)).any(axis=(2, 3))
+    near: Any = np.lib.stride_tricks.sliding_window_view(np.pad(shines, 1), (3, 3)).any(axis=(2, 3))
     return np.asarray(_squares(np.repeat(near[..., None], 3, axis=2))[..., 0] == 0.0)
 
 
