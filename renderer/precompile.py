@@ -111,7 +111,8 @@ def _wind() -> None:
 
 def _study() -> None:
     octree = Octree.from_mesh(_TRIANGLE)
-    occlusion(octree, [0.1, 0.1, 1.0], None, [[0.0, 0.0, -1.0]])
+    for transmittance in (None, [0.5]):
+        occlusion(octree, [0.1, 0.1, 1.0], None, [[0.0, 0.0, -1.0]], transmittance=transmittance)
     # The face is seen edge-on, and the scanner stands on it.
     visible_faces(octree, [9.0, 0.1, 0.0])
     scan(octree, [0.1, 0.1, 0.0], [[0.0, 0.0, 1.0]])

@@ -71,12 +71,22 @@ def gather_chunk(descriptor, rays, begin, end, choice, counts, doubles, integers
     """
     tree = tree_pointers(descriptor)
     source, found = batch_pointers(rays, tree.scale), Found(pointer(doubles), pointer(integers), doubles.shape[1])
-    bad, kept = first_bad_ray(source, begin, end), np.int64(0)
+    bad = first_bad_ray(source, begin, end)
     if bad >= 0:
         return begin, bad
-    memory = scratch_pointers(scratch, source.starts)
+    return gather_rays(tree, source, begin, end, choice, counts, found, scratch_pointers(scratch, source.starts)), -1
+
+
+@kernel
+def gather_rays(tree, source, begin, end, choice, counts, found, memory):
+    """``gather_chunk`` for rays in bounds. Returns the ray before which it ended.
+
+    source  ``RayPointers``
+    found   ``Found``, whose first hits are those of the ray ``begin``
+    memory  ``ScratchPointers`` of a ``traverse.Scratch`` for CANDIDATE_WORDS rays
+    """
     candidates = make_candidates(memory.waiting)
-    hits, rounds = np.int64(0), np.int64(0)
+    hits, rounds, kept = np.int64(0), np.int64(0), np.int64(0)
     # Where the candidates of rays were found, they are used: only hits end it between such rays.
     while begin < end and hits + rounds <= _WORK:
         reached, taken = minimum(begin + TOGETHER, end), np.int64(0)
@@ -86,7 +96,7 @@ def gather_chunk(descriptor, rays, begin, end, choice, counts, doubles, integers
         for i in range(begin, reached):
             count = _list_all(tree, source, i, candidates, i - begin, found, memory)
             if kept + count > found.capacity or hits > _WORK:
-                return i, -1
+                return i
             hits += count
             # rule: max-hits
             counts[i] = minimum(_ordered(tree, found, count, choice.contacts, choice.keep), choice.most)
@@ -94,7 +104,7 @@ def gather_chunk(descriptor, rays, begin, end, choice, counts, doubles, integers
                 _keep(found, kept, counts[i], tree.scale, make_shear(ray_at(source, i)[0]).direction_z)
                 kept += counts[i]
         begin = reached
-    return begin, -1
+    return begin
 
 
 class _Query(NamedTuple):

@@ -38,7 +38,8 @@ class Study:
     kind : {"sky", "sun", "ao"}
         `sky_view_factor`, `sun_hours` or `ambient_occlusion` of ``renderer.studies``.
     options : dict, optional
-        Keyword arguments of that function, without points, normals, ``leaving``, ``threads`` and ``progress``.
+        Keyword arguments of that function, without points, normals, ``leaving``, ``threads`` and ``progress``. Arrays,
+        such as ``transmittance``, are told apart by their numbers.
 
     Raises
     ------

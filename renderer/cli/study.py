@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from renderer.cli.cluster import add_cluster, on_cluster
-from renderer.cli.meshes import Files, kept_of, load_files, say_up, up_of, values_of_files
+from renderer.cli.meshes import Files, is_array, kept_of, load_files, say_up, transmittance_of, up_of, values_of_files
 from renderer.cli.render import resolution
 from renderer.errors import expect
 from renderer.system.terminal import say
@@ -18,7 +18,18 @@ _MESH = (
     "mesh files (.ply, .obj, .stl, .glb, .gltf), or folders of them; several are one mesh, and the summary has the "
     "values of each"
 )
-_UP = "the axis that points up; default: y for glTF, else z. kind sun: with it, suns below the horizon do not count"
+_UP = (
+    "the axis that points up; default: y for glTF, else z. kind sun: with it, or with angles in --suns, suns below the "
+    "horizon do not count"
+)
+_SUNS = (
+    "sun: a text of rows x y z hours, to the sun; or a table whose first line has the names azimuth, elevation and, if "
+    "given, hours: degrees, clockwise from north, which is +y, or -z where y is up; pvlib's tables are read as they are"
+)
+_TRANSMITTANCE = (
+    "the share of light that faces let through: of the mesh files of a name or pattern, such as 'tree*.obj=0.3'; or an "
+    ".npy file with a value for each face; may be given again"
+)
 _HIDE = "leave out the mesh files of this name or pattern, such as 'tree*.obj'; may be given again"
 _VERTICES = "a value for each vertex: the mean of its faces' values, weighted by their areas"
 _GRID = "points of a level grid this far apart, dropped from above on the mesh"
@@ -61,9 +72,10 @@ def add_study(commands: Any) -> None:
     )  # fmt: skip
     study.add_argument("--patches", type=int, metavar="N", help="sky: the number of directions; default: 145")
     study.add_argument("--definition", choices=("cosine", "geometric"), help="sky: what is weighed; default: cosine")
-    study.add_argument("--suns", type=Path, metavar="FILE", help="sun: a text of rows x y z hours, to the sun")
+    study.add_argument("--suns", type=Path, metavar="FILE", help=_SUNS)
     study.add_argument("--samples", type=int, metavar="N", help="ao: directions of each point; default: 256")
     study.add_argument("--max-distance", type=float, default=float("inf"), metavar="D", help=_DISTANCE)
+    study.add_argument("--transmittance", action="append", default=[], metavar="NAME=VALUE", help=_TRANSMITTANCE)
     # The former name of --max-distance.
     study.add_argument("--distance", dest="max_distance", type=float, default=argparse.SUPPRESS, help=argparse.SUPPRESS)
     study.add_argument("--camera", type=Path, metavar="SCENE", help="for a .png: a scene file with the camera")
@@ -97,10 +109,13 @@ def _study(options: argparse.Namespace) -> None:
     options.mesh = mesh_paths(options.mesh)
     _check_output(options)
     paths = kept_of(options.mesh, options.hide)
-    up = _up(paths, options)
+    up, line = up_of(paths, options.up)
     made = _options_of(options, up)
+    _say_up(line, options, made)
     layout = _layout(options)
     files = load_files(paths)
+    if options.transmittance:
+        made["transmittance"] = transmittance_of(files, options.transmittance)
     octree = Octree.from_mesh(files.mesh, threads=options.threads)
     chosen = _chosen(octree, options, up)
     began = time.perf_counter()
@@ -117,13 +132,11 @@ def _study(options: argparse.Namespace) -> None:
     parts.remove()
 
 
-def _up(paths: list[Path], options: argparse.Namespace) -> str:
-    """The axis that points up; says which was taken where it matters and nobody said."""
-    up, line = up_of(paths, options.up)
+def _say_up(line: str, options: argparse.Namespace, made: dict[str, Any]) -> None:
+    """Say which axis was taken for the one that points up, if it matters and nobody said."""
     from_above = any(output.suffix.lower() == ".png" for output in options.output) and options.camera is None
-    if line and not options.quiet and (options.kind == "sky" or options.grid or options.points or from_above):
+    if line and not options.quiet and ("up" in made or options.grid or options.points or from_above):
         say_up(line)
-    return up
 
 
 def _say_result(options: argparse.Namespace, files: Files, chosen: Any, parts: Any, seconds: float) -> None:
@@ -155,7 +168,9 @@ def _check_output(options: argparse.Namespace) -> None:
     from renderer.system.files import are_apart, check_writable
 
     on_mesh = options.grid is None and options.points is None
-    read = [file for file in (*options.mesh, options.points, options.suns, options.camera) if file is not None]
+    arrays = (Path(word) for word in options.transmittance if is_array(word))
+    given = (*options.mesh, options.points, options.suns, options.camera, *arrays)
+    read = [file for file in given if file is not None]
     for output in options.output:
         suffix = output.suffix.lower()
         expect(suffix in FORMATS, "--output", f"one of {', '.join(FORMATS)}", str(output))
@@ -180,16 +195,17 @@ def _check_options(options: argparse.Namespace) -> None:
         expect(options.grid is not None or getattr(options, name) is None, f"--{name}", "none without --grid", "one")
 
 
-def _options_of(options: argparse.Namespace, up: str) -> dict[str, Any]:
-    """The keyword arguments of the study."""
-    from renderer.studies.points import suns_of
+def _options_of(options: argparse.Namespace, up: Any) -> dict[str, Any]:
+    """The keyword arguments of the study, but for those that need the mesh."""
+    from renderer.studies.sun_files import suns_of
 
     of: dict[str, Any] = {"max_distance": options.max_distance}
     if options.kind == "sky":
         of["up"] = up
     if options.kind == "sun":
-        of |= {} if options.up is None else {"up": up}
-        return of | dict(zip(("sun_directions", "weights"), suns_of(options.suns), strict=True))
+        suns = suns_of(options.suns, up)
+        of |= {"up": up} if options.up is not None or suns.have_horizon else {}
+        return of | {"sun_directions": suns.directions, "weights": suns.hours}
     return of | {name: value for name in _OWN[options.kind] if (value := getattr(options, name)) is not None}
 
 

@@ -10,7 +10,7 @@ from renderer.arguments.split import SPLIT, Split
 from renderer.checkpoints.parts import Parts, digest_of
 from renderer.checkpoints.study import PART, Study, parts_of
 from renderer.cluster.tasks import Results, Task, results
-from renderer.cluster.workers import SentMesh, evaluate_part
+from renderer.cluster.workers import SentMesh, SentStudy, evaluate_part
 from renderer.errors import expect
 from renderer.octree import Octree
 from renderer.picture.render import check_tree
@@ -87,10 +87,11 @@ def run_on(
     folder = _checked(whole, study, points, folder, size, split)
     mesh = whole.mesh
     parts = parts_of(whole, study, points, folder, size)
-    sent = SentMesh(digest_of(mesh.vertices, mesh.faces), mesh.vertices, mesh.faces, split)
+    digest = digest_of(mesh.vertices, mesh.faces)
+    sent = SentStudy(digest, SentMesh(digest, mesh.vertices, mesh.faces, split), study)
 
     def compute(missing: list[int]) -> Results:
-        tasks = (Task(part, sent, (study, points.part(parts.rows(part)))) for part in missing)
+        tasks = (Task(part, sent, (points.part(parts.rows(part)),)) for part in missing)
         return results(client, evaluate_part, tasks)
 
     parts.complete(compute, "point", progress)

@@ -68,6 +68,16 @@ class SentScene(NamedTuple):
         return prepared
 
 
+class SentStudy(NamedTuple):
+    """A study as it travels, once for all its parts: the digest of its mesh, the mesh, and itself with its options,
+    some of which have a number for each face.
+    """
+
+    digest: str
+    mesh: SentMesh
+    study: Any
+
+
 def _kept(key: str, make: Callable[[], Any]) -> Any:
     with _LOCK:
         if key not in _TREES:
@@ -77,9 +87,9 @@ def _kept(key: str, make: Callable[[], Any]) -> Any:
         return _TREES[key]
 
 
-def evaluate_part(mesh: SentMesh, study: Any, points: Any) -> NDArray[np.float64]:
+def evaluate_part(sent: SentStudy, points: Any) -> NDArray[np.float64]:
     """The answers to a study's part; a task."""
-    answers: NDArray[np.float64] = study.evaluate(mesh.octree(), points, threads=1)
+    answers: NDArray[np.float64] = sent.study.evaluate(sent.mesh.octree(), points, threads=1)
     return answers
 
 

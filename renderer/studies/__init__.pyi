@@ -19,5 +19,6 @@ from .scanner import Scan as Scan
 from .scanner import scan as scan
 from .sky import sky_view_factor as sky_view_factor
 from .sky import sun_hours as sun_hours
+from .suns import sun_directions as sun_directions
 from .views import depth_map as depth_map
 from .views import visible_faces as visible_faces

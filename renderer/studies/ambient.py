@@ -23,6 +23,7 @@ def ambient_occlusion(
     *,
     samples: int = 256,
     max_distance: float = np.inf,
+    transmittance: ArrayLike | None = None,
     leaving: ArrayLike | None = None,
     threads: int | None = None,
     progress: bool = False,
@@ -42,6 +43,7 @@ def ambient_occlusion(
         The number of directions, from 1 to 2^24: those of `cosine_hemisphere`, turned about each normal.
     leaving : array_like of int, shape (...), optional
     max_distance : float, default inf
+    transmittance : array_like, shape (F,), optional
     threads : int, optional
     progress : bool, default False
         As for `occlusion`.
@@ -52,7 +54,7 @@ def ambient_occlusion(
     -------
     ndarray of float64, shape (...)
         1/pi times the integral of d . n over the open directions d of the hemisphere about the normal n. It is a whole
-        number of samples over `samples`.
+        number of samples over `samples`. With `transmittance` a direction is open by the share of its ray that is left.
 
     Raises
     ------
@@ -73,7 +75,7 @@ def ambient_occlusion(
     array([1. , 0.5])
     """
     expect(normals is not None, "normals", "vectors", "None")
-    request = check_request(octree, points, normals, leaving, threads, progress)
+    request = check_request(octree, points, normals, leaving, threads, progress, transmittance)
     check_count("samples", samples)
     reach = check_reach(max_distance, distance)
     return _open_share(request, cosine_hemisphere(samples), reach, turned=True)
@@ -85,6 +87,7 @@ def openness(
     *,
     samples: int = 1024,
     max_distance: float = np.inf,
+    transmittance: ArrayLike | None = None,
     leaving: ArrayLike | None = None,
     threads: int | None = None,
     progress: bool = False,
@@ -101,6 +104,7 @@ def openness(
         The number of directions, from 1 to 2^24, of equal solid angle: those of `fibonacci_sphere`.
     leaving : array_like of int, shape (...), optional
     max_distance : float, default inf
+    transmittance : array_like, shape (F,), optional
     threads : int, optional
     progress : bool, default False
         As for `occlusion`.
@@ -110,7 +114,8 @@ def openness(
     Returns
     -------
     ndarray of float64, shape (...)
-        1 far from everything, 1/2 just above level ground, 0 inside a closed mesh.
+        1 far from everything, 1/2 just above level ground, 0 inside a closed mesh. With `transmittance` a direction
+        counts by the share of its ray that is left.
 
     Raises
     ------
@@ -130,7 +135,7 @@ def openness(
     >>> openness(octree, [[0.5, 0.5, 0.5], [0.5, 0.5, 1.0001], [0.5, 0.5, 1000]], samples=100)
     array([0. , 0.5, 1. ])
     """
-    request = check_request(octree, points, None, leaving, threads, progress)
+    request = check_request(octree, points, None, leaving, threads, progress, transmittance)
     check_count("samples", samples)
     return _open_share(request, fibonacci_sphere(samples), check_reach(max_distance, distance), turned=False)
 

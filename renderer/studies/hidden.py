@@ -35,6 +35,7 @@ def occlusion(
     leaving: ArrayLike | None = None,
     packed: Literal[False] = False,
     max_distance: float = np.inf,
+    transmittance: ArrayLike | None = None,
     threads: int | None = None,
     progress: bool = False,
     distance: float | None = None,
@@ -52,6 +53,7 @@ def occlusion(
     leaving: ArrayLike | None = None,
     packed: Literal[True],
     max_distance: float = np.inf,
+    transmittance: ArrayLike | None = None,
     threads: int | None = None,
     progress: bool = False,
     distance: float | None = None,
@@ -69,6 +71,7 @@ def occlusion(
     leaving: ArrayLike | None = None,
     packed: bool = False,
     max_distance: float = np.inf,
+    transmittance: ArrayLike | None = None,
     threads: int | None = None,
     progress: bool = False,
     distance: float | None = None,
@@ -85,6 +88,7 @@ def occlusion(
     leaving: ArrayLike | None = None,
     packed: bool = False,
     max_distance: float = np.inf,
+    transmittance: ArrayLike | None = None,
     threads: int | None = None,
     progress: bool = False,
     distance: float | None = None,
@@ -92,7 +96,7 @@ def occlusion(
     """The share of directions that is HIDDEN from each point, or one bit for each point and direction.
 
     A direction d is hidden if it lies at or below the horizon of the point, d . n <= 0 for the unit normal n, or if a
-    ray in this direction hits the mesh.
+    ray in this direction hits the mesh. With `transmittance` the faces hide a part of it.
 
     Parameters
     ----------
@@ -112,6 +116,10 @@ def occlusion(
         Return bits, not shares. There are no `weights` then.
     max_distance : float, default inf
         How far from a point a hit still counts, in scene units.
+    transmittance : array_like, shape (F,), optional
+        The share of a ray that each face lets through, from 0 to 1: 0 hides all, as every face does by default, and 1
+        hides nothing. What is left of a ray is the product of the shares of all faces that it crosses. So are trees,
+        shades and screens. There are no bits of it, so `packed` is an error then.
     threads : int, optional
         By default those of the octree.
     progress : bool, default False
@@ -123,6 +131,7 @@ def occlusion(
     -------
     ndarray of float64, shape (...)
         The weights of the hidden directions over all weights: exactly 0 if all is open, exactly 1 if all is hidden.
+        With `transmittance` a direction counts by the share of its ray that is lost.
     ndarray of uint8, shape (..., ceil(k / 8))
         If `packed`: a set bit for each hidden direction, in the order of ``numpy.unpackbits(..., axis=-1, count=k)``.
 
@@ -141,6 +150,10 @@ def occlusion(
     The normal says on which side of its faces a point lies: directions that lead through them to the other side are
     hidden. Without a normal the faces that hold the point hide nothing.
 
+    A ray through an edge or corner crosses one of the faces that meet there. A ray that starts on a translucent face
+    keeps all of it, unless it leads through that face to the other side. The mesh is divided into opaque and
+    translucent faces, each with a tree, which are kept with the octree for the next study with the same numbers.
+
     The bits of a point depend neither on the threads nor on the other points. Memory is that of the points and of the
     result: rays are never written down.
 
@@ -157,11 +170,19 @@ def occlusion(
     >>> bits = occlusion(octree, [[3, 0.5, 0.25]], [0, 0, 1], around, packed=True)
     >>> np.unpackbits(bits, axis=-1, count=4)
     array([[1, 1, 1, 0]], dtype=uint8)
+
+    A box of foil that lets half of the light through each side: a ray through the box crosses two.
+
+    >>> foil = [0.5] * 12
+    >>> occlusion(octree, [[3, 0.5, 0.25]], None, around, transmittance=foil)
+    array([0.1875])
     """
-    request = check_request(octree, points, normals, leaving, threads, progress)
+    bits = flag_argument("packed", packed)
+    expect(not bits or transmittance is None, "transmittance", "None with packed, as bits have no shares", "an array")
+    request = check_request(octree, points, normals, leaving, threads, progress, transmittance)
     directions = check_directions("directions", directions)
     limits = limits_of(check_reach(max_distance, distance), directions)
-    if flag_argument("packed", packed):
+    if bits:
         expect(weights is None, "weights", "None, as bits have none", "an array")
         return evaluate_bits(request, Sky(directions, np.ones(len(directions)), limits, False, False))
     values = check_weights("weights", weights, len(directions))

@@ -1,4 +1,4 @@
-"""The points of a study: of faces, of vertices, of a grid or of a file; and directions to the sun of a file."""
+"""The points of a study: of faces, of vertices, of a grid or of a file."""
 
 from __future__ import annotations
 
@@ -128,35 +128,19 @@ def of_file(octree: Octree, path: Path, up: Literal["x", "y", "z"] = "z") -> Cho
     return Chosen(Points(points, normals, np.full(len(points), -1, np.int64)))
 
 
-def suns_of(path: Path) -> tuple[Floats, Floats]:
-    """Directions to the sun (k, 3) and hours (k,) from a text file with rows x y z hours, or x y z for one hour.
-
-    Numbers are separated by spaces or commas. Lines that begin with # are comments.
-    """
-    try:
-        text = path.read_text(encoding="utf-8").replace(",", " ")
-        rows = np.array([line.split() for line in text.splitlines() if line.split("#")[0].strip()], np.float64)
-    except OSError as error:
-        raise _unreadable("--suns", path, error) from None
-    except ValueError as error:
-        raise ValueError(f"--suns: expected rows of 3 or 4 numbers, got {path}: {error}") from None
-    good = rows.ndim == 2 and rows.shape[1] in (3, 4)
-    expect(good, "--suns", "rows x y z, or x y z hours", f"an array of shape {rows.shape} in {path}")
-    return rows[:, :3].copy(), rows[:, 3].copy() if rows.shape[1] == 4 else np.ones(len(rows))
-
-
 def _face_points(mesh: Mesh) -> tuple[Points, NDArray[np.int64]]:
     found = face_points(mesh)
     expect(len(found.points) > 0, "mesh", "a face that has an area", "none")
     return Points(found.points, found.normals, found.faces), found.faces
 
 
-def _read_array(argument: str, path: Path) -> NDArray[Any]:
+def read_array(argument: str, path: Path) -> NDArray[Any]:
+    """The array of real numbers in an ``.npy`` file."""
     try:
         with open(path, "rb") as file:  # which NumPy leaves open where it is broken
             array = np.load(file, allow_pickle=False)
     except OSError as error:
-        raise _unreadable(argument, path, error) from None
+        raise unreadable(argument, path, error) from None
     except _BROKEN as error:
         raise ValueError(f"{argument}: expected an .npy file, got {path}: {error}") from None
     expect(isinstance(array, np.ndarray), argument, "one array in an .npy file", str(path))
@@ -169,14 +153,14 @@ def _rows_of_file(argument: str, path: Path) -> NDArray[Any]:
     """The rows of a file of points, by its suffix."""
     suffix = path.suffix.lower()
     if suffix == ".npy":
-        return _read_array(argument, path)
+        return read_array(argument, path)
     expect(suffix in (".csv", ".xyz", ".ply"), argument, "an .npy, .csv, .xyz or .ply file", str(path))
     try:
         if suffix == ".ply":
             return point_rows(path.read_bytes())
         return _text_rows(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise _unreadable(argument, path, error) from None
+        raise unreadable(argument, path, error) from None
     except ValueError as error:
         raise ValueError(f"{argument}: expected rows of 3 or 6 numbers, got {path}: {error}") from None
 
@@ -190,5 +174,6 @@ def _text_rows(text: str) -> NDArray[np.float64]:
     return np.array(rows, np.float64) if rows else np.empty((0, 3))
 
 
-def _unreadable(argument: str, path: Path, error: OSError) -> ValueError:
+def unreadable(argument: str, path: Path, error: OSError) -> ValueError:
+    """The error for a file that cannot be read."""
     return ValueError(f"{argument}: expected a file that can be read, got {path}: {error.strerror or error}")

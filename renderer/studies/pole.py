@@ -1,4 +1,4 @@
-"""The direction that points up, given as an axis or a vector."""
+"""A direction, such as that which points up, given as an axis or a vector."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from renderer.errors import expect
 from renderer.studies.share import check_directions
 
 
-def pole_of(up: str | ArrayLike) -> NDArray[np.float64]:
-    """The direction (3,) of the axis named 'x', 'y' or 'z', or the vector itself."""
+def pole_of(up: str | ArrayLike, argument: str = "up") -> NDArray[np.float64]:
+    """The direction (3,) of the axis named 'x', 'y' or 'z', or the vector itself. Errors name ``argument``."""
     if isinstance(up, str):
-        return np.eye(3)[up_axis(up)]
-    rows = check_directions("up", np.reshape(up, (1, -1)) if np.ndim(up) == 1 else up)
-    expect(len(rows) == 1, "up", "shape (3,)", f"shape {rows.shape}")
+        return np.eye(3)[up_axis(up, argument)]
+    rows = check_directions(argument, np.reshape(up, (1, -1)) if np.ndim(up) == 1 else up)
+    expect(len(rows) == 1, argument, "shape (3,)", f"shape {rows.shape}")
     return rows[0]

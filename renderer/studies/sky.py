@@ -40,6 +40,7 @@ def sky_view_factor(
     up: Literal["x", "y", "z"] | ArrayLike = "z",
     leaving: ArrayLike | None = None,
     max_distance: float = np.inf,
+    transmittance: ArrayLike | None = None,
     threads: int | None = None,
     progress: bool = False,
     distance: float | None = None,
@@ -47,7 +48,8 @@ def sky_view_factor(
     """The sky view factor of each point, from 0 to 1.
 
     The sky is the hemisphere about `up`. A direction of it is open if it lies above the horizon of the point, d . n > 0
-    for the unit normal n, and if its ray hits nothing.
+    for the unit normal n, and if its ray hits nothing. With `transmittance` it is open by the share of its ray that is
+    left.
 
     Parameters
     ----------
@@ -66,6 +68,7 @@ def sky_view_factor(
         The axis or direction that points up, to the middle of the sky.
     leaving : array_like of int, shape (...), optional
     max_distance : float, default inf
+    transmittance : array_like, shape (F,), optional
     threads : int, optional
     progress : bool, default False
         As for `occlusion`.
@@ -101,10 +104,18 @@ def sky_view_factor(
     >>> octree = Octree.from_mesh(box((0, -500, 0), (1, 500, 500)))
     >>> sky_view_factor(octree, [[9.0, 0, 900], [1.001, 0, 0.001]], patches=10000).round(2)
     array([1. , 0.5])
+
+    Under an awning that lets a quarter of the light through.
+
+    >>> awning = Octree.from_mesh(box((-900, -900, 2), (900, 900, 3)))
+    >>> cloth = [0.5] * 12  # above and below
+    >>> sky_view_factor(awning, [[0, 0, 0]], transmittance=cloth).round(4)
+    array([0.25])
     """
     _expect_definition(definition)
     pole = pole_of(up)
-    request = check_request(octree, points, pole if normals is None else normals, leaving, threads, progress)
+    normals = pole if normals is None else normals
+    request = check_request(octree, points, normals, leaving, threads, progress, transmittance)
     pattern = _patches(patches)
     directions = turned(pattern.directions, pole)
     # rule: cosine-of-patches
@@ -124,13 +135,15 @@ def sun_hours(
     up: Literal["x", "y", "z"] | ArrayLike | None = None,
     leaving: ArrayLike | None = None,
     max_distance: float = np.inf,
+    transmittance: ArrayLike | None = None,
     threads: int | None = None,
     progress: bool = False,
     distance: float | None = None,
 ) -> Floats:
     """The hours for which each point sees the sun: the sum of the weights of the sun positions that it sees.
 
-    A point does not see a sun at or below its own horizon, nor one that the mesh hides.
+    A point does not see a sun at or below its own horizon, nor one that the mesh hides. With `transmittance` the hours
+    of a sun count by the share of its ray that is left.
 
     Parameters
     ----------
@@ -139,7 +152,8 @@ def sun_hours(
     normals : array_like, shape (..., 3) or (3,), or None
         As for `occlusion`.
     sun_directions : array_like, shape (k, 3)
-        From the points to the sun, in the coordinates of the mesh, one for each step of time.
+        From the points to the sun, in the coordinates of the mesh, one for each step of time, such as those of
+        `sun_directions` from azimuth and elevation.
     weights : array_like, shape (k,), optional
         The hours of each step, >= 0. By default 1 each.
     up : {"x", "y", "z"} or array_like, shape (3,), optional
@@ -147,6 +161,7 @@ def sun_hours(
         count like all others, and light walls from below where the mesh has no ground.
     leaving : array_like of int, shape (...), optional
     max_distance : float, default inf
+    transmittance : array_like, shape (F,), optional
     threads : int, optional
     progress : bool, default False
         As for `occlusion`.
@@ -175,7 +190,7 @@ def sun_hours(
     >>> sun_hours(octree, [[-2, 0, 0]], None, suns, [3.0, 4.0, 3.5, 13.5], up="z")
     array([7.5])
     """
-    request = check_request(octree, points, normals, leaving, threads, progress)
+    request = check_request(octree, points, normals, leaving, threads, progress, transmittance)
     suns = check_directions("sun_directions", sun_directions)
     hours = check_weights("weights", weights, len(suns))
     reach = check_reach(max_distance, distance)

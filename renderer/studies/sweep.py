@@ -65,7 +65,7 @@ RAYS_A_CALL = 1 << 14
 # normal; the frame, whose third vector is the point's own normal; the sum so far; that of all directions; its row of
 # ``starts.record``; and of a point on an edge the table of ``starts.fan``.
 _ABOVE, _BELOW, _FACING, _FRAME = 0, 3 * TILE, 6 * TILE, 9 * TILE
-_SUM, _WHOLE, _START, _FAN = 18 * TILE, 19 * TILE, 20 * TILE, (20 + ROW) * TILE
+SUM, WHOLE, _START, _FAN = 18 * TILE, 19 * TILE, 20 * TILE, (20 + ROW) * TILE
 # The room for all tables: what sixteen faces a point take; and for a table of none.
 _FANS, _LEAST_FAN = 256 * TILE, FAN_HEAD
 _POINT_DOUBLES = _FAN + _FANS
@@ -132,7 +132,7 @@ class SweepScratch(NamedTuple):
     parallel: ParallelScratch
 
 
-class _SweepPointers(NamedTuple):
+class SweepPointers(NamedTuple):
     """Pointers into a ``SweepScratch`` and to the mesh: the tile's points; origins, directions, t_max and starts of
     rays; the points with directions that are listed, (direction * TILE + point) * 2, and 1 more for those that have a
     ray; and their values.
@@ -166,14 +166,14 @@ def make_sweep_scratch(depth: int) -> SweepScratch:
 
 
 @inlined
-def _scratch_pointers(arrays, vertices, faces):
-    """The ``_SweepPointers`` of a ``SweepScratch`` and a mesh."""
+def sweep_pointers(arrays, vertices, faces):
+    """The ``SweepPointers`` of a ``SweepScratch`` and a mesh."""
     doubles, integers = pointer(arrays.doubles), pointer(arrays.integers)
     origins = offset(doubles, _POINT_DOUBLES)
     directions, limits, values = offset(origins, 3 * RAYS), offset(origins, 6 * RAYS), offset(origins, 7 * RAYS)
     starts, zero = offset(origins, 8 * RAYS), offset(origins, (8 + ROW) * RAYS)
     store(zero, 0, 0.0)
-    return _SweepPointers(
+    return SweepPointers(
         doubles, integers, origins, directions, limits, starts, values, zero, offset(integers, _POINT_INTEGERS),
         pointer(vertices), pointer(faces),
         hit_pointers(arrays.hits, 0), scratch_pointers(arrays.trace, ON_SURFACE), parallel_pointers(arrays.parallel),
@@ -189,7 +189,7 @@ def _frame_of(normal):
 
 
 @kernel
-def _begin_tile(tree, places, rows, begin, count, scratch):
+def begin_tile(tree, places, rows, begin, count, scratch):
     """Read ``count`` points, those in ``rows`` from ``begin`` on, and prepare where their rays start."""
     points, normals, leaving = pointer(places.points), pointer(places.normals), pointer(places.leaving)
     step = np.int64(len(places.normals) > 1)
@@ -210,8 +210,8 @@ def _begin_tile(tree, places, rows, begin, count, scratch):
         if face >= 0:
             put3(start, ANCHOR, row3(pointer(places.anchors), row))
             _begin_on_face(tree, scratch, i, o, face, places.codes[row], len(places.normals) > 0)
-        store(scratch.points, _SUM + i, 0.0)
-        store(scratch.points, _WHOLE + i, 0.0)
+        store(scratch.points, SUM + i, 0.0)
+        store(scratch.points, WHOLE + i, 0.0)
 
 
 @kernel
@@ -252,7 +252,7 @@ def _begin_on_edge(tree, starts, scratch, i, n, has_horizon):
 
 
 @kernel
-def _start_ray(scratch, i, d, ray):
+def start_ray(scratch, i, d, ray):
     """Write the origin and the start of a ray from point ``i`` in direction d. Returns whether nothing stops it yet."""
     own, row = offset(scratch.points, _START + ROW * i), offset(scratch.starts, ROW * ray)
     for k in range(ROW):
@@ -275,7 +275,7 @@ def _start_ray(scratch, i, d, ray):
 
 @kernel
 def _start_on_edge(scratch, i, d, row):
-    """``_start_ray`` for a point on or near an edge, whose start is written."""
+    """``start_ray`` for a point on or near an edge, whose start is written."""
     begin, stop = load(scratch.numbers, _TABLE + i), OPEN
     if np.int64(load(row, CODE)) & KNOWN != 0:
         stop = UNSURE
@@ -289,6 +289,24 @@ def _start_on_edge(scratch, i, d, row):
     return stop != STOPPED
 
 
+@inlined
+def look(places, sky, scratch, i, given, weight):
+    """The direction in which a tile's i-th point looks, its height above the point's horizon, and what it adds, for a
+    direction of the sky and its value.
+    """
+    d, height, value = given, 1.0, weight
+    if sky.turned:
+        frame = offset(scratch.points, _FRAME + 9 * i)
+        across = add(scale(row3(frame, 0), given[0]), scale(row3(frame, 1), given[1]))
+        d, height = add(across, scale(row3(frame, 2), given[2])), given[2]
+    elif len(places.normals) > 0:
+        height = dot(three(scratch.points, _FRAME + 9 * i + 6), given)
+    if sky.cosine:
+        # rule: cosine-weight
+        value *= abs(height)
+    return d, height, value
+
+
 @kernel
 def _aim(places, sky, scratch, k, count, listed, rays):
     """List a tile's ``count`` points with direction ``k``, after the entries and rays that are listed already.
@@ -296,21 +314,11 @@ def _aim(places, sky, scratch, k, count, listed, rays):
     Returns the entries and rays with them. What is below the horizon of a point, or behind its face, has no ray.
     """
     given, weight, limit = row3(pointer(sky.directions), k), sky.values[k], sky.limits[k]
-    has_horizon = len(places.normals) > 0
     for i in range(count):
-        d, height, value = given, 1.0, weight
-        if sky.turned:
-            frame = offset(scratch.points, _FRAME + 9 * i)
-            across = add(scale(row3(frame, 0), given[0]), scale(row3(frame, 1), given[1]))
-            d, height = add(across, scale(row3(frame, 2), given[2])), given[2]
-        elif has_horizon:
-            height = dot(three(scratch.points, _FRAME + 9 * i + 6), given)
-        if sky.cosine:
-            # rule: cosine-weight
-            value *= abs(height)
-        store(scratch.points, _WHOLE + i, load(scratch.points, _WHOLE + i) + value)
+        d, height, value = look(places, sky, scratch, i, given, weight)
+        store(scratch.points, WHOLE + i, load(scratch.points, WHOLE + i) + value)
         # rule: open-above-horizon
-        seen = height > 0.0 and _start_ray(scratch, i, d, rays)
+        seen = height > 0.0 and start_ray(scratch, i, d, rays)
         if seen:
             put3(scratch.directions, 3 * rays, d)
             store(scratch.limits, rays, limit)
@@ -336,19 +344,19 @@ def _take_down(answers, scratch, listed):
             ray += 1
         k, i = (code >> 1) // TILE, (code >> 1) % TILE
         if hides == answers.hidden:
-            store(scratch.points, _SUM + i, load(scratch.points, _SUM + i) + load(scratch.values, entry))
+            store(scratch.points, SUM + i, load(scratch.points, SUM + i) + load(scratch.values, entry))
         if hides and len(answers.bits) > 0:
             row = load(scratch.numbers, _ROW + i)
             answers.bits[row, k >> 3] |= np.uint8(0x80 >> (k & 7))
 
 
 @kernel
-def _end_tile(answers, scratch, count):
+def end_tile(answers, scratch, count):
     """Write the sums of a tile's points."""
     if len(answers.sums) == 0:
         return
     for i in range(count):
-        total, whole = load(scratch.points, _SUM + i), load(scratch.points, _WHOLE + i)
+        total, whole = load(scratch.points, SUM + i), load(scratch.points, WHOLE + i)
         # Nothing counts where all directions lie in the horizon of a point that weighs them by the cosine.
         answers.sums[load(scratch.numbers, _ROW + i)] = total / whole if answers.share and whole > 0.0 else total
 
@@ -391,10 +399,10 @@ def sweep(descriptor, vertices, faces, places, sky, answers, rows, steps, begin,
 
     All is done at (len(rows), 0).
     """
-    tree, scratch = tree_pointers(descriptor), _scratch_pointers(arrays, vertices, faces)
+    tree, scratch = tree_pointers(descriptor), sweep_pointers(arrays, vertices, faces)
     count = _tile_from(rows, steps, begin)
     if k == 0:
-        _begin_tile(tree, places, rows, begin, count, scratch)
+        begin_tile(tree, places, rows, begin, count, scratch)
     traced, parallel = np.int64(0), len(steps) > 0 and tree.has_nodes and not sky.turned and count >= _TOGETHER
     while k < len(sky.values) and traced < RAYS_A_CALL:
         together = parallel and load(scratch.numbers, _LEFT) > 0
@@ -407,5 +415,5 @@ def sweep(descriptor, vertices, faces, places, sky, answers, rows, steps, begin,
         traced += listed
     if k < len(sky.values):
         return begin, k
-    _end_tile(answers, scratch, count)
+    end_tile(answers, scratch, count)
     return begin + count, np.int64(0)

@@ -18,9 +18,10 @@ from renderer import Octree, load_mesh
 from renderer.checkpoints.study import KINDS
 from renderer.cli.main import main, make_parser
 from renderer.mesh.load import save_ply
-from renderer.studies import face_points
+from renderer.studies import face_points, sun_directions
 
 CAMERA = {"eye": [3.0, -4.0, 5.0], "target": [0.0, 0.0, 0.5], "up": [0.0, 0.0, 1.0], "fov": 50.0}
+FACES = len(scenery().faces)
 # The words of a study, and the arguments of its function; {} is the folder of files.
 FUNCTIONS: dict[str, tuple[str, list[str], dict[str, Any]]] = {
     "--patches": ("sky", ["--patches", "100"], {"patches": 100}),
@@ -32,7 +33,19 @@ FUNCTIONS: dict[str, tuple[str, list[str], dict[str, Any]]] = {
     "--up": ("sky", ["--up", "y"], {"up": "y"}),
     "--up of sun": ("sun", ["--suns", "{}/suns.txt", "--up", "x"], {"up": "x"}),
     "--suns": ("sun", ["--suns", "{}/more.txt"], {"sun_directions": [[1, 0.2, 0.7], [0, 0.5, 0.4]], "weights": [2, 1]}),
+    "--suns of angles": (
+        "sun",
+        ["--suns", "{}/angles.csv"],
+        {"sun_directions": sun_directions([90, 180, 0], [45, 45, -30]), "weights": [2, 1, 4], "up": "z"},
+    ),
     "--samples": ("ao", ["--samples", "64"], {"samples": 64}),
+    "--transmittance": ("sky", ["--transmittance", "mesh.ply=0.25"], {"transmittance": np.full(FACES, 0.25)}),
+    "--transmittance of sun": (
+        "sun",
+        ["--suns", "{}/suns.txt", "--transmittance", "{}/shares.npy"],
+        {"transmittance": np.linspace(0.0, 1.0, FACES)},
+    ),
+    "--transmittance of ao": ("ao", ["--transmittance", "m*.ply=0.5"], {"transmittance": np.full(FACES, 0.5)}),
 }
 # What changes neither the points nor what is asked of them, so that parts of a run may be taken over.
 BITLESS: dict[str, list[str]] = {
@@ -57,6 +70,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     save_ply(mesh, folder / "mesh.ply")
     (folder / "suns.txt").write_text("1 0.2 0.7 2\n-0.6 0.5 0.4 3.5\n")
     (folder / "more.txt").write_text("1 0.2 0.7 2\n0 0.5 0.4 1\n")
+    (folder / "angles.csv").write_text("time,azimuth,elevation,hours\n9:00,90,45,2\n12:00,180,45,1\n24:00,0,-30,4\n")
+    np.save(folder / "shares.npy", np.linspace(0.0, 1.0, FACES))
     points = np.array([[0.5, 0.5, 0.25], [-1.0, 0.75, 0.5], [0.1, 0.2, 2.0]])
     np.save(folder / "points.npy", points)
     np.save(folder / "normals.npy", np.hstack([points, [[1.0, 0.0, 0.0], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0]]]))
@@ -116,6 +131,7 @@ def test_every_option_has_a_case() -> None:
     "octree-render study", "octree-render study --definition", "octree-render study --distance",
     "octree-render study --max-distance", "octree-render study --up",
     "octree-render study --faces", "octree-render study --patches", "octree-render study --samples",
+    "octree-render study --transmittance",
     "octree-render study kind",
 )  # fmt: skip
 @cases("where", [[], ["--cluster"]])

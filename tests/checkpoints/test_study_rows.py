@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from twins import CORNERS, MESH, NORMALS, meetings
 
 from renderer import Mesh, Octree
-from renderer.studies.points import of_file, on_faces, on_grid, on_vertices, suns_of
+from renderer.studies.points import of_file, on_faces, on_grid, on_vertices
+from renderer.studies.sun_files import suns_of
 
 Floats = NDArray[np.float64]
 
@@ -92,6 +93,7 @@ def test_suns_are_read_in_their_rows_with_their_hours(tmp_path: Path, hours: boo
     rows = ["1 0 2", "# a comment", " -3,4,5", "", "  # another", "6\t-7, 8e-1"]
     last = [" 0.5", "", " ,1.5", "", "", ",2"] if hours else [""] * 6
     (tmp_path / "suns.txt").write_text("\n".join(a + b for a, b in zip(rows, last, strict=True)))
-    suns, weights = suns_of(tmp_path / "suns.txt")
+    suns, weights, have_horizon = suns_of(tmp_path / "suns.txt")
     np.testing.assert_array_equal(suns, [[1, 0, 2], [-3, 4, 5], [6, -7, 0.8]])
     np.testing.assert_array_equal(weights, [0.5, 1.5, 2.0] if hours else np.ones(3))
+    assert not have_horizon

@@ -45,6 +45,17 @@ def test_a_study_on_workers_has_the_bits_of_one_process(client: Any, octree: Oct
     assert 1 < other.plan.parts < there.plan.parts and other.joined().tobytes() == expected.tobytes()
 
 
+def test_the_transmittance_of_faces_goes_to_workers(client: Any, octree: Octree, tmp_path: Path) -> None:
+    """And belongs to a run: parts with other numbers are not taken over."""
+    shares = np.random.default_rng(8).choice([0.0, 0.5, 1.0], len(octree.mesh.faces))
+    places, study = face_points(octree.mesh), Study("sky", {"transmittance": shares})
+    there = run_on(client, octree, study, places, tmp_path / "there", size=SIZE * 4)
+    expected = study.evaluate(octree, places)
+    assert there.joined().tobytes() == expected.tobytes() != Study("sky").evaluate(octree, places).tobytes()
+    with pytest.raises(ValueError, match="of another"):
+        run_on(client, octree, Study("sky", {"transmittance": shares / 2}), places, tmp_path / "there", size=SIZE * 4)
+
+
 def test_a_scene_goes_to_workers_as_its_merged_mesh(client: Any, octree: Octree, tmp_path: Path) -> None:
     scene = RayScene()
     scene.add(octree, [[[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 0]] for x in (0.0, 500.0)])

@@ -243,6 +243,7 @@ def checkout(tmp_path, monkeypatch):
     for name in ("city.ply", "scan.ply"):
         save_ply(box((0.0, 0.0, 0.0), (4.0, 3.0, 2.0)), tmp_path / name)
     (tmp_path / "suns.txt").write_text("1 0 1\n-1 0 1\n")
+    (tmp_path / "suns.csv").write_text("azimuth,elevation,hours\n90,45,1\n270,45,2\n")
     save_ply(box((0.0, 0.0, 0.0), (4.0, 3.0, 2.0)), tmp_path / "my.ply")
     (tmp_path / "script.py").write_text("from renderer import Octree\n")
     for _, text in blocks("toml"):

@@ -33,6 +33,9 @@ ANSWERS: dict[str, Callable[[Any, Any], Any]] = {
     "closest_point": lambda on, at: closest_point(on, at.points + 0.1),
     "depth_map": lambda on, at: depth_map(on, CAMERA, 60, 40),
     "grid_points": lambda on, at: tuple(grid_points(on, 0.3)),
+    "light through faces": lambda on, at: sky_view_factor(
+        on, at.points, at.normals, transmittance=np.linspace(0.0, 1.0, 12 * 3 + len(torus().faces))
+    ),
     "occlusion": lambda on, at: occlusion(on, at.points, at.normals, tregenza().directions, packed=True),
     "openness": lambda on, at: openness(on, at.points, samples=50),
     "rays of trimesh": lambda on, at: RayMeshIntersector(on).intersects_id(at.points + 9.0, at.normals - 9.0),

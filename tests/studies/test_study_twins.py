@@ -14,7 +14,7 @@ import pytest
 from array_forms import FORMS, shaped, shapes_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from twins import FACES, MESH, Flags, Floats, Integers, meetings
+from twins import FACES, MESH, Floats, Integers, meetings
 
 from renderer import BruteForce, Mesh, Octree, studies
 from renderer.studies import (
@@ -54,18 +54,21 @@ class Places:
     faces: Integers
     normals: Floats | None = None
 
-    def hides(self, directions: Floats, distance: float) -> Flags:
-        """Which directions (n, k, 3) are hidden from each point."""
-        hidden = []
+    def left(self, directions: Floats, asked: dict[str, Any]) -> Floats:
+        """What is left of rays in directions (n, k, 3) behind all faces that they cross up to a distance."""
+        shares, distance = asked.get("transmittance", np.zeros(FACES)), asked.get("max_distance", np.inf)
+        left = []
         for ways, point, face, normal in zip(directions, self.points, self.faces, self.all_normals(), strict=True):
             t = meetings(CORNERS, np.broadcast_to(point, ways.shape), ways)
             t[:, face] = np.nan if face >= 0 else t[:, face]
-            met = ((t >= 0.0) & (t * np.linalg.norm(ways, axis=1)[:, None] <= distance)).any(axis=1)
+            met = (t >= 0.0) & (t * np.linalg.norm(ways, axis=1)[:, None] <= distance)
+            kept = np.where(met, shares, 1.0).prod(axis=1)
             if normal.any():
                 side = np.sign(NORMALS[face] @ normal) if face >= 0 else 0.0
-                met |= (ways @ normal <= 0.0) | ((ways @ NORMALS[face]) * side < 0.0)
-            hidden.append(met)
-        return np.stack(hidden)
+                kept = np.where((ways @ NORMALS[face]) * side < 0.0, kept * shares[face], kept)
+                kept[ways @ normal <= 0.0] = 0.0
+            left.append(kept)
+        return np.stack(left)
 
     def all_normals(self) -> Floats:
         return np.zeros_like(self.points) if self.normals is None else self.normals
@@ -85,12 +88,12 @@ def frame(pole: Floats) -> Floats:
 
 
 def occlusion(places: Places, asked: dict[str, Any]) -> Any:
-    ways, distance = asked["directions"], asked.get("max_distance", np.inf)
-    hidden = places.hides(alike(ways, places), distance)
+    ways = asked["directions"]
+    left = places.left(alike(ways, places), asked)
     if asked.get("packed"):
-        return np.packbits(hidden, axis=-1)
+        return np.packbits(left == 0.0, axis=-1)
     weights = np.ones(len(ways)) if asked.get("weights") is None else asked["weights"]
-    return hidden @ weights / weights.sum()
+    return (1.0 - left) @ weights / weights.sum()
 
 
 def axis_of(up: Any) -> Floats:
@@ -103,7 +106,7 @@ def sun_hours(places: Places, asked: dict[str, Any]) -> Any:
     hours = np.ones(len(suns)) if asked.get("weights") is None else asked["weights"]
     if asked.get("up") is not None:
         hours = np.where(suns @ axis_of(asked["up"]) > 0.0, hours, 0.0)
-    return ~places.hides(alike(suns, places), asked.get("max_distance", np.inf)) @ hours
+    return places.left(alike(suns, places), asked) @ hours
 
 
 def sky_view_factor(places: Places, asked: dict[str, Any]) -> Any:
@@ -114,7 +117,7 @@ def sky_view_factor(places: Places, asked: dict[str, Any]) -> Any:
     ways = ways if up[0] == up[1] == 0.0 < up[2] else ways @ frame(up)
     if places.normals is None:
         places = Places(places.points, places.faces, alike(up / np.linalg.norm(up), places))
-    seen = ~places.hides(alike(ways, places), asked.get("max_distance", np.inf))
+    seen = places.left(alike(ways, places), asked)
     if asked.get("definition", "cosine") == "cosine":
         weights = weights * np.abs(places.normals @ (ways / np.linalg.norm(ways, axis=1)[:, None]).T)
     whole = np.broadcast_to(weights, seen.shape).sum(axis=1)
@@ -124,12 +127,12 @@ def sky_view_factor(places: Places, asked: dict[str, Any]) -> Any:
 def ambient_occlusion(places: Places, asked: dict[str, Any]) -> Any:
     ways = cosine_hemisphere(asked.get("samples", 256)).directions
     turned = np.stack([ways @ frame(normal) for normal in places.all_normals()])
-    return 1.0 - places.hides(turned, asked.get("max_distance", np.inf)).mean(axis=1)
+    return places.left(turned, asked).mean(axis=1)
 
 
 def openness(places: Places, asked: dict[str, Any]) -> Any:
     ways = fibonacci_sphere(asked.get("samples", 1024)).directions
-    return 1.0 - places.hides(alike(ways, places), asked.get("max_distance", np.inf)).mean(axis=1)
+    return places.left(alike(ways, places), asked).mean(axis=1)
 
 
 TWINS = {f.__name__: f for f in (occlusion, sun_hours, sky_view_factor, ambient_occlusion, openness)}
@@ -172,6 +175,11 @@ def pattern_of(seed: int, count: int) -> Pattern:
     return Pattern(ways, weights_of(seed, count))
 
 
+def shares_of(seed: int, kinds: list[float]) -> Floats:
+    """What each face lets through."""
+    return np.random.default_rng(seed).choice(kinds, FACES)
+
+
 FEW = st.sampled_from([1, 7, 8, 9, 40])
 DISTANCES = st.sampled_from([0.0, 0.7, 4.0, np.inf])
 OPTIONS: dict[str, st.SearchStrategy[Any]] = {
@@ -186,6 +194,9 @@ OPTIONS: dict[str, st.SearchStrategy[Any]] = {
     "patches": st.one_of(st.sampled_from([1, 50, 145, 577]), st.builds(pattern_of, SEEDS, FEW)),
     "samples": st.sampled_from([1, 2, 100]),
     "threads": st.sampled_from([None, 1, 3]),
+    "transmittance": st.builds(
+        shares_of, SEEDS, st.sampled_from([[0.0], [1.0], [0.7], [0.0, 1.0], [0.0, 0.3, 1.0], [0.25, 0.8]])
+    ),
 }
 # Drawn with the places and directions; what is shown while it runs is no matter of answers; a former name is tested in
 # test_hidden.py.
@@ -200,6 +211,8 @@ def drawn(data: st.DataObject, study: str, places: Places) -> dict[str, Any]:
     needed |= {"samples"} & known.keys() if len(places.points) > 40 else set()
     chosen = needed | data.draw(st.sets(st.sampled_from(sorted(known.keys() - ELSEWHERE))))
     asked = {name: data.draw(OPTIONS[name]) for name in sorted(chosen)}
+    if asked.get("packed"):
+        asked.pop("transmittance", None)
     if "weights" in known and not asked.get("packed") and data.draw(st.booleans()):
         ways = asked.get("directions", asked.get("sun_directions"))
         asked["weights"] = weights_of(data.draw(SEEDS), len(ways))

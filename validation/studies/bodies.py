@@ -31,6 +31,14 @@ def shaft(radius: float, depth: float) -> Mesh:
     return Mesh(corners, np.concatenate([np.stack([a, b, _SIDES + b], 1), np.stack([a, _SIDES + b, _SIDES + a], 1)]))
 
 
+def awning(radius: float, height: float) -> Mesh:
+    """A level disc about z, in faces around its middle."""
+    angle, numbers = 2.0 * np.pi * np.arange(_SIDES) / _SIDES, np.arange(_SIDES)
+    ring = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(_SIDES, height)], axis=1)
+    corners = np.append(ring, [[0.0, 0.0, height]], axis=0)
+    return Mesh(corners, np.stack([numbers, np.roll(numbers, -1), np.full(_SIDES, _SIDES)], axis=1))
+
+
 def walls(planes: str) -> Mesh:
     """A large triangle across each of the named axes at 0: of "xz" a wall and a floor."""
     far = 1e7

@@ -12,7 +12,7 @@ from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
 from renderer.octree import Octree
 from renderer.studies import ambient_occlusion, openness, sky_view_factor
-from validation.studies.bodies import FAR, shaft, street, walls
+from validation.studies.bodies import FAR, awning, shaft, street, walls
 
 Floats = NDArray[np.float64]
 # Where a street's floor is asked: so many places across it, and as many streets.
@@ -91,7 +91,8 @@ def forms() -> list[tuple[Form, Callable[[int], float]]]:
     ball, away = Octree.from_mesh(icosphere(5)), 1.5
     tilts = np.radians([0.0, 30.0, 60.0, 90.0, 120.0, 180.0])
     normals = np.stack([np.sin(tilts) * 0.6, np.sin(tilts) * 0.8, np.cos(tilts)], axis=1)
-    below = walls("z")
+    below, cloth = walls("z"), awning(2.0, 1.5)
+    shade = {"transmittance": np.full(len(cloth.faces), 0.25)}
     skies = [
         *streets(),
         Form("sky_view_factor", "bottom of a round shaft", "form factor of a disc, r^2 / (r^2 + h^2)",
@@ -99,6 +100,10 @@ def forms() -> list[tuple[Form, Callable[[int], float]]]:
         Form("sky_view_factor", "bottom of a round shaft, solid angle", "1 - h / sqrt(r^2 + h^2)",
              np.array([1.0 - 1.5 / np.sqrt(3.25)]),
              lambda n: sky_view_factor(disc, [[0.0, 0.0, 0.0]], patches=n, definition="geometric")),
+        _sky("under a round awning, a quarter of the light through it", "1 - 3/4 r^2 / (r^2 + h^2)", cloth,
+             1.0 - 0.75 * 4.0 / 6.25, points=[[0.0, 0.0, 0.0]], **shade),
+        _sky("under a round awning, solid angle", "1 - 3/4 (1 - h / sqrt(r^2 + h^2))", cloth,
+             1.0 - 0.75 * (1.0 - 1.5 / 2.5), points=[[0.0, 0.0, 0.0]], definition="geometric", **shade),
         Form("sky_view_factor", "beside an endless wall", "1/2", np.array([0.5]),
              lambda n: sky_view_factor(wall, [[0.01, 0.0, 0.0]], leaving=[1], patches=n)),
         _sky("tilted planes in the open", "(1 + cos b) / 2", below, (1.0 + np.cos(tilts)) / 2.0,

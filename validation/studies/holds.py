@@ -168,6 +168,23 @@ def weights_and_distances_of_directions() -> Asked:
     return _count(np.array(found) == known)
 
 
+def light_through_screens() -> Asked:
+    """Each of k screens that let half of the light through halves it, also along the diagonals of all: exactly 2^-k."""
+    points, found, known = np.array([[0.5, 0.25, 0.0], [0.0, 0.0, 0.0]]), [], []
+    suns = [[0.0, 0.0, 1.0], [1.0, 0.5, 4.0], [3.0, 3.0, 4.0]]
+    for count in (1, 3, 20):
+        mesh = Mesh.concatenate([box((-FAR, -FAR, 1.0 + k), (FAR, FAR, 1.5 + k)) for k in range(count)])
+        octree, halves = Octree.from_mesh(mesh), np.full(len(mesh.faces), 0.5)
+        left = 0.25**count  # below and above of each box
+        found += [
+            sun_hours(octree, points, None, suns, [1.0, 2.0, 4.0], transmittance=halves),
+            occlusion(octree, points, [0, 0, 1], suns, transmittance=halves),
+            sun_hours(octree, points, None, suns[:1], transmittance=halves, max_distance=1.75),
+        ]
+        known += [np.full(2, 7.0 * left), np.full(2, 1.0 - left), np.full(2, 0.25)]
+    return _count(np.array(found) == known)
+
+
 def faces_that_an_eye_sees() -> Asked:
     """Of a ball, an eye sees exactly the faces whose plane it is above."""
     mesh = icosphere(4)
@@ -300,6 +317,7 @@ CHECKS = {
     ),
     "hours of sun in a street": Check(hours_behind_walls, ("studies.sun_hours",)),
     "weights and distances": Check(weights_and_distances_of_directions, ("studies.occlusion",)),
+    "light through screens": Check(light_through_screens, ("studies.sun_hours", "studies.occlusion")),
     "faces that an eye sees": Check(faces_that_an_eye_sees, ("studies.visible_faces",)),
     "clouds and depths": Check(clouds_and_depths, ("studies.scan", "studies.depth_map")),
     "clouds from a roof": Check(clouds_from_a_roof, ("studies.scan",)),

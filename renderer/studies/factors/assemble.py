@@ -18,9 +18,6 @@ from renderer.studies.factors.tally import BACK, SKY
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# What may change of an exact entry beside others, where rays alone do not fill the rows.
-_LITTLE = 1e-9
-
 
 class _Counted(NamedTuple):
     """The entries that rays counted, on and above the diagonal: values, freedom and variance of each."""
@@ -37,8 +34,8 @@ def assembled(areas: Floats, pairs: KnownPairs, hits: RowHits) -> ViewFactors:
     outside_freedom = np.divide(areas, hits.rays, out=np.zeros(number), where=hits.rays > 0)
     upper, freedom, variance = _together(pairs, counted)
     found = balanced(Exchanges(upper, freedom, sky + backs, outside_freedom), areas)
-    # What rays alone cannot fill: exact entries change as little as that leaves open.
-    found = balanced(found._replace(freedom=np.maximum(freedom, _LITTLE * areas.mean())), areas)
+    # What no ray fills, less than a ray's share of a row: all entries change, exact ones too, by as much.
+    found = balanced(found._replace(freedom=np.ones(len(freedom)), outside_freedom=np.ones(number)), areas)
     share = np.divide(found.outside, sky + backs, out=np.zeros(number), where=sky + backs > 0.0)
     warn_of_backs(backs * share / areas)
     errors = type(upper)((np.sqrt(variance), upper.indices, upper.indptr), shape=upper.shape)

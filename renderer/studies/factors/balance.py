@@ -13,9 +13,9 @@ from renderer.studies.factors.sparse import scipy_sparse
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# Steps of Newton's method, which doubles the digits in each; and the sums that are taken for exact: some roundings of a
-# row of many entries.
-_STEPS, _EXACT = 24, 1e-14
+# Steps of Newton's method, which doubles the digits in each once it is near; the sums that are taken for exact, some
+# roundings; and those that rounding alone may make worse again.
+_STEPS, _EXACT, _ROUNDED = 40, 1e-14, 1e-9
 # A step is found so well: more would not help the next one.
 _STEP_ERROR, _STEP_ITERATIONS = 1e-4, 400
 # The largest change of the logarithm of an entry in a step: beyond, Newton's method may overshoot.
@@ -60,14 +60,13 @@ def balanced(exchanges: Exchanges, areas: Floats) -> Exchanges:
         diagonal = sums(np.where(on_diagonal, 2.0, 1.0) * slopes, open_now * outside_freedom)
         missing = np.where(diagonal > 0.0, areas - sums(now, open_now), 0.0)
         worst = (np.abs(missing) / areas).max(initial=0.0)
-        if worst >= least:
-            break
-        found, least = (now, open_now), worst
-        if worst <= _EXACT:
+        if worst < least:
+            found, least = (now, open_now), worst
+        if worst <= _EXACT or (least < worst and least <= _ROUNDED):
             break
         step = _step(_with(upper, np.where(on_diagonal, 0.0, slopes)), diagonal, missing)
-        change = max(np.abs(freedom * (step[rows] + step[columns])).max(initial=0.0), _MOST)
-        levels += step * (_MOST / change)
+        change = np.abs(freedom * (step[rows] + step[columns])).max(initial=_MOST)
+        levels += step * (_MOST / max(change, np.abs(outside_freedom * step).max(initial=0.0)))
     return exchanges._replace(upper=_with(upper, found[0]), outside=found[1])
 
 

@@ -14,8 +14,9 @@ from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.queryable import Queries
 from renderer.rayscene.scene import RayScene
-from renderer.studies.factors.aim import senders_of
+from renderer.studies.factors.aim import REPLICATES, senders_of
 from renderer.studies.factors.assemble import assembled
+from renderer.studies.factors.free import without_matrix
 from renderer.studies.factors.known import KnownPairs, known_of, pairs_worth
 from renderer.studies.factors.result import ViewFactors
 from renderer.studies.factors.rows import FIRST_RAYS, RowHits, Tracing, nothing_known, trace_rows
@@ -41,6 +42,7 @@ def view_factors(
     transmittance: ArrayLike | None = None,
     rtol: float = 0.02,
     max_rays: int = 1 << 16,
+    form: Literal["matrix", "rays"] = "matrix",
     threads: int | None = None,
     progress: bool = False,
 ) -> ViewFactors:
@@ -65,6 +67,10 @@ def view_factors(
         their squares, are at most `rtol`: the share of what it sends that may arrive elsewhere.
     max_rays : int, default 65536
         Of a surface, from 256 to 2^24.
+    form : {"matrix", "rays"}, default "matrix"
+        "rays": keep no matrix, but the surface that each ray hits, for scenes of a million surfaces. Each has
+        `max_rays` then, from 8 on, and `rtol` does not count. `exchange` multiplies vectors by ``@`` as the matrix
+        does; there are no `errors`, and sums are 1 within 1e-9.
     threads : int, optional
         By default those of the octree.
     progress : bool, default False
@@ -115,11 +121,15 @@ def view_factors(
     scipy_sparse()
     searched = octree_of(octree)
     surfaces = check_surfaces(searched.mesh, groups, sides, transmittance)
-    rtol, max_rays = check_effort(rtol, max_rays)
+    free = isinstance(form, str) and form == "rays"
+    expect(free or (isinstance(form, str) and form == "matrix"), "form", "'matrix' or 'rays'", repr(form))
+    rtol, max_rays = check_effort(rtol, max_rays, REPLICATES if free else FIRST_RAYS)
     workers = searched.threads if threads is None else checked_threads(threads)
     senders = senders_of(searched.mesh, surfaces)
     shown = flag_argument("progress", progress)
     tracing = Tracing(searched._built, surfaces, senders, rtol, max_rays, workers, shown)
+    if free:
+        return without_matrix(tracing)
     pairs = _known_pairs(tracing)
     left = surfaces.areas - pairs.sums(surfaces.number) > _WHOLE * surfaces.areas
     rows = np.flatnonzero(left)
@@ -127,12 +137,12 @@ def view_factors(
     return assembled(surfaces.areas, pairs, _spread(hits, rows, surfaces.number))
 
 
-def check_effort(rtol: float, max_rays: int) -> tuple[float, int]:
+def check_effort(rtol: float, max_rays: int, least: int = FIRST_RAYS) -> tuple[float, int]:
     """The arguments that say how many rays there are."""
     given = real_argument("rtol", rtol)
     good = given.ndim == 0 and 0.0 < float(given) < math.inf
     expect(good, "rtol", "a number above 0", repr(rtol))
-    return float(given), count_argument("max_rays", max_rays, FIRST_RAYS, _MOST_RAYS)
+    return float(given), count_argument("max_rays", max_rays, least, _MOST_RAYS)
 
 
 def _known_pairs(tracing: Tracing) -> KnownPairs:

@@ -20,8 +20,8 @@ from renderer.numerics.simd import fabs, load, local_doubles, maximum, minimum, 
 from renderer.numerics.vec3 import add, cross, dot, row3, scale, sub
 from renderer.trace.layout import locked
 
-# Nodes of each piece. A piece of length 1 from 0 has a singularity at -1, 2 or 1 +- i at worst, which bounds the error
-# by 4.2^(-2 n), 1e-15 for n = 12.
+# Nodes of Gauss and Legendre on each piece. A piece from 0 to 1 has a singularity at -1, 2, i or 1 + i at worst, which
+# bounds the error by 4.2^(-2 n), 1e-15 for n = 12.
 _NODES = 12
 # The shortest piece, as a share of the edge. Singularities are as mild as t ln t, so a piece that has one at its end
 # errs by a millionth of its length squared: 2e-17.
@@ -33,12 +33,27 @@ _PARALLEL = 2.0**-92
 # The largest sum of the radii of polygons, as a share of their distance, for the rules of degree 5 and 8. Their errors
 # are about these shares to the 6th and 9th power: 1e-12.
 _FAR, _APART = 0.01, 0.045
+# Errors over areas as a share of the result; over contours, where terms cancel, as a share of the radii's product. Of
+# 90,000 pairs of needles, of faces that touch, nearly touch and others, turned at random or cut into parts, none
+# changed by more than 1.4e-15 of that.
+_AREA_ERROR, _CONTOUR_ERROR = 1e-11, 4e-15
 
 
-def _gauss(count: int) -> list[float]:
-    """Nodes and weights on (0, 1), in turn."""
-    nodes, weights = np.polynomial.legendre.leggauss(count)
-    return list(np.stack([(nodes + 1.0) / 2.0, weights / 2.0], axis=1).ravel())
+# Places and weights on (0, 1), rounded from 60 digits.
+_GAUSS = (
+    (0.009219682876640375, 0.023587668193255914),
+    (0.04794137181476257, 0.05346966299765921),
+    (0.11504866290284765, 0.08003916427167311),
+    (0.2063410228566913, 0.10158371336153296),
+    (0.3160842505009099, 0.1167462682691774),
+    (0.43738329574426554, 0.12457352290670139),
+    (0.5626167042557345, 0.12457352290670139),
+    (0.6839157494990901, 0.1167462682691774),
+    (0.7936589771433087, 0.10158371336153296),
+    (0.8849513370971523, 0.08003916427167311),
+    (0.9520586281852375, 0.05346966299765921),
+    (0.9907803171233597, 0.023587668193255914),
+)
 
 
 def _orbit(weight: float, *corners: float) -> list[float]:
@@ -65,8 +80,15 @@ _SIXTEEN = (
     + _orbit(0.027230314174435, 0.008394777409958, 0.263112829634638, 0.728492392955404)
 )
 # All rules as kernels read them: where each begins.
-RULES = locked(np.array(_gauss(_NODES) + _SEVEN + _SIXTEEN))
+RULES = locked(np.array([number for row in _GAUSS for number in row] + _SEVEN + _SIXTEEN))
 _AT_SEVEN, _AT_SIXTEEN = 2 * _NODES, 2 * _NODES + 4 * 7
+
+
+class Exchange(NamedTuple):
+    """An exchange area and a bound of its rounding errors."""
+
+    area: float
+    error: float
 
 
 class _Singular(NamedTuple):
@@ -86,33 +108,35 @@ class _Edge(NamedTuple):
 
 @kernel
 def exchange_between(first, second, rules):
-    """``exchange_area`` of polygons (n, 3) and (m, 3), for Python."""
-    return exchange_area(pointer(first), len(first), pointer(second), len(second), pointer(rules))
+    """``exchange_of`` polygons (n, 3) and (m, 3), for Python: the area alone."""
+    return exchange_of(pointer(first), len(first), pointer(second), len(second), pointer(rules)).area
 
 
 @kernel
-def exchange_area(first, n, second, m, rules):
-    """A_i F_ij of two convex polygons, in the unit of their corners squared.
+def exchange_of(first, n, second, m, rules):
+    """The ``Exchange`` A_i F_ij of two convex polygons, in the unit of their corners squared.
 
     first, second  ``pointer`` to n and m corners, counter-clockwise seen from the side that sends
     rules          ``pointer`` to RULES
 
-    It is negative if just one of the two shows the other its back. The absolute error is about 1e-15 of the product of
-    the longest sides where polygons are near.
+    It is negative if just one of the two shows the other its back.
     """
     a, b = _centre(first, n), _centre(second, m)
     radius_a, radius_b = _radius(first, n, a), _radius(second, m, b)
     way = sub(b, a)
     distance = math.sqrt(dot(way, way))
     if radius_a + radius_b <= _FAR * distance:
-        return _over_areas(first, n, second, m, offset(rules, _AT_SEVEN), 7)
+        area = _over_areas(first, n, second, m, offset(rules, _AT_SEVEN), 7)
+        return Exchange(area, fabs(area) * _AREA_ERROR)
     if radius_a + radius_b <= _APART * distance:
-        return _over_areas(first, n, second, m, offset(rules, _AT_SIXTEEN), 16)
+        area = _over_areas(first, n, second, m, offset(rules, _AT_SIXTEEN), 16)
+        return Exchange(area, fabs(area) * _AREA_ERROR)
     # Distances are measured in this unit, so that logarithms are near 0 and little cancels.
     unit = maximum(distance, maximum(radius_a, radius_b))
+    per_square, error = 1.0 / (unit * unit), radius_a * radius_b * _CONTOUR_ERROR
     if radius_a <= radius_b:
-        return _over_contours(first, n, second, m, 1.0 / (unit * unit), rules)
-    return _over_contours(second, m, first, n, 1.0 / (unit * unit), rules)
+        return Exchange(_over_contours(first, n, second, m, per_square, rules), error)
+    return Exchange(_over_contours(second, m, first, n, per_square, rules), error)
 
 
 @kernel

@@ -88,9 +88,10 @@ def known_of(tracing: Tracing, worth: Worth) -> KnownPairs:
     once = ~own[pair] | (first < second)
     pair, first, second = pair[once], first[once], second[once]
     faces = np.stack([np.minimum(first, second), np.maximum(first, second)], axis=1)
-    sound = ~surfaces.both[faces].any(axis=1)
+    two_sided = bool(surfaces.both.all())
+    sound = ((surfaces.transmittance == 0.0) & (surfaces.both == two_sided))[faces].all(axis=1)
     with progress_bar(len(faces), "pair", tracing.progress) as update:
-        exchange, known = exact_pairs(tracing.built, faces, tracing.threads, update)
+        exchange, known = exact_pairs(tracing.built, faces, tracing.threads, update, both=two_sided)
     unknown = np.bincount(pair, ~(known & sound), len(sizes)) > 0
     values = np.bincount(pair, exchange, len(sizes)) * np.where(own, 2.0, 1.0)
     kept = ~unknown

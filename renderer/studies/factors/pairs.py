@@ -13,7 +13,7 @@ from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import load, local_doubles, maximum, minimum, offset, pointer
 from renderer.numerics.vec3 import add, cross, dot, largest_component, put3, row3, scale, sub
 from renderer.queryable import Built
-from renderer.studies.factors.contour import RULES, exchange_area
+from renderer.studies.factors.contour import RULES, exchange_of
 from renderer.studies.factors.shaft import MOST_PLANES, PLANE, ROUNDING, Shaft, is_clear, with_planes
 from renderer.system.threads import for_chunks
 from renderer.trace.closest import rays_against_blocks
@@ -28,6 +28,11 @@ _CORNERS, _CUT, _NORMALS, _PLANES = 0, 24, 48, 54
 assert _PLANES + PLANE * MOST_PLANES <= 500
 # A triangle that is narrower than so many roundings of its coordinates has no plane.
 _NO_PLANE = 2.0**10
+# No corner is taken to be in a plane that is farther off than so, as a share of the size of both triangles.
+_IN_PLANE = 2.0**-24
+# An exchange is known if its error is at most this share of itself, or this share of the area of each face, so that it
+# is lost in their rows. Needles and what is seen edge-on lose digits.
+_RELATIVE, _OF_AREAS = 1e-7, 1e-11
 # The sides of a plane on which a triangle's corners are: behind or in it, before or in it, in it, on both.
 _BEHIND, _BEFORE, _IN, _ACROSS = range(4)
 
@@ -79,7 +84,8 @@ def exact_pairs(
     Notes
     -----
     The proof moves vertices by some roundings of their largest coordinate, see ``shaft``. A known exchange has a
-    relative error of 1e-10 at most, unless a face is a needle or seen edge-on.
+    relative error of 1e-11 at most. Where a face is a needle or seen edge-on, it errs by up to 1e-7, or by 1e-11 of the
+    area of each face.
 
     Examples
     --------
@@ -89,6 +95,7 @@ def exact_pairs(
     >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 1, 1], [1, 0, 1]]
     >>> exchange, known = exact_pairs(Octree(corners, [[0, 1, 2], [3, 4, 5]])._built, np.array([[0, 1]]), 1)
     >>> known.tolist(), exchange.round(6).tolist()
+    ([True], [0.057525])
     """
     mesh, tree = built
     exchange, known = np.zeros(len(pairs)), np.zeros(len(pairs), np.bool_)
@@ -158,12 +165,14 @@ def _exchange(tree, stack, memory, pair, rules):
         return none
     if minimum(width_a, width_b) < _NO_PLANE * ROUNDING * largest:
         return unknown
-    plane_a = _plane(memory, ROUNDING * largest * (1.0 + size / width_a))
-    plane_b = _plane(offset(memory, 9), ROUNDING * largest * (1.0 + size / width_b))
+    error, most = ROUNDING * largest, _IN_PLANE * size
+    plane_a = _plane(memory, minimum(error * (1.0 + size / width_a), most))
+    plane_b = _plane(offset(memory, 9), minimum(error * (1.0 + size / width_b), most))
     side_a, side_b = _side(plane_b, memory), _side(plane_a, offset(memory, 9))
     if side_a == _IN or side_b == _IN:
-        # Faces that lie on each other may see each other whole or not at all.
-        return none if dot(plane_a.normal, plane_b.normal) > 0.0 else unknown
+        # Faces that lie on each other, front to front, may see each other whole or not at all.
+        alike = not pair.both and dot(plane_a.normal, plane_b.normal) > 0.0
+        return none if alike or _lie_side_by_side(memory, plane_a, plane_b) else unknown
     if pair.both and (side_a == _ACROSS or side_b == _ACROSS):
         return unknown
     if not pair.both and (side_a == _BEHIND or side_b == _BEHIND):
@@ -185,8 +194,10 @@ def _exchange(tree, stack, memory, pair, rules):
     )  # fmt: skip
     if not is_clear(tree, stack, shaft):
         return unknown
-    exchange = exchange_area(corners, n, offset(corners, 3 * n), m, rules)
-    return _Known(abs(exchange) if pair.both else maximum(exchange, 0.0), True)
+    found = exchange_of(corners, n, offset(corners, 3 * n), m, rules)
+    area = abs(found.area) if pair.both else found.area
+    limit = maximum(_RELATIVE * area, _OF_AREAS * minimum(_area(memory), _area(offset(memory, 9))))
+    return _Known(area, True) if found.error <= limit and found.error < area else unknown
 
 
 @kernel
@@ -224,6 +235,14 @@ def _width(corners, n):
 
 
 @kernel
+def _area(corners):
+    """The area of a triangle."""
+    p = row3(corners, 0)
+    double = cross(sub(row3(corners, 1), p), sub(row3(corners, 2), p))
+    return 0.5 * math.sqrt(dot(double, double))
+
+
+@kernel
 def _plane(corners, room):
     """The ``_Plane`` of a triangle."""
     p = row3(corners, 0)
@@ -242,6 +261,23 @@ def _side(plane, corners):
     if low >= -plane.room:
         return _IN if high <= plane.room else _BEFORE
     return _BEHIND if high <= plane.room else _ACROSS
+
+
+@kernel
+def _lie_side_by_side(corners, plane_a, plane_b):
+    """Whether an edge of one of two triangles in one plane parts them."""
+    for first in range(2):
+        own, other = offset(corners, 9 * first), offset(corners, 9 - 9 * first)
+        plane = plane_b if first == 1 else plane_a
+        for k in range(3):
+            p = row3(own, k)
+            edge = sub(row3(own, k + 1 if k < 2 else 0), p)
+            out, least = cross(edge, plane.normal), np.inf
+            for corner in range(3):
+                least = minimum(least, dot(out, sub(row3(other, corner), p)))
+            if least >= -plane.room * math.sqrt(dot(edge, edge)):
+                return True
+    return False
 
 
 @kernel

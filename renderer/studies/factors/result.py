@@ -25,13 +25,14 @@ class ViewFactors:
     areas : ndarray of float64, shape (n,)
         The area A that each surface sends from: of both sides where both send, times 1 minus the transmittance.
     exchange : scipy.sparse.csr_array of float64, shape (n, n)
-        A_i F_ij. Exactly symmetric, nowhere negative; the diagonal of a plane surface is 0.
+        A_i F_ij. Exactly symmetric, nowhere negative; the diagonal of a plane surface is 0. With ``form="rays"`` an
+        operator that multiplies vectors by ``@``.
     sky : ndarray of float64, shape (n,)
         The share of what each surface sends that meets nothing.
     backs : ndarray of float64, shape (n,)
         The share that ends on backs of faces, which do not receive. It is 0 in a sound model.
-    errors : scipy.sparse.csr_array of float64, shape (n, n)
-        The standard error of each entry of `matrix`; an entry that is exact has none.
+    errors : scipy.sparse.csr_array of float64, shape (n, n), or None
+        The standard error of each entry of `matrix`; an entry that is exact has none. None with ``form="rays"``.
     rays : ndarray of int64, shape (n,)
         The rays that left each surface.
 
@@ -53,14 +54,15 @@ class ViewFactors:
     exchange: csr_array
     sky: Floats
     backs: Floats
-    errors: csr_array
+    errors: csr_array | None
     rays: NDArray[np.int64]
 
     @property
     def matrix(self) -> csr_array:
         """The view factors F, (n, n) csr_array: F_ij is the share of what surface i sends that arrives at surface j.
 
-        Each row has the sum 1 with `sky` and `backs`, and A_i F_ij = A_j F_ji.
+        Each row has the sum 1 with `sky` and `backs`, and A_i F_ij = A_j F_ji. Raises ``ValueError`` with
+        ``form="rays"``.
 
         Examples
         --------
@@ -73,6 +75,8 @@ class ViewFactors:
         >>> view_factors(inside, walls).matrix.toarray()[0].round(4)
         array([0.    , 0.1998, 0.2   , 0.2   , 0.2   , 0.2   ])
         """
+        if self.errors is None:
+            raise ValueError("matrix: expected view factors with form='matrix', got form='rays', which has none")
         factors = self.exchange.copy()
         factors.data /= np.repeat(self.areas, np.diff(factors.indptr))
         return factors

@@ -29,7 +29,7 @@ Integers = NDArray[np.int64]
 
 # The rays of a row at first: the least that tells a share of a hundredth from one of a fiftieth.
 FIRST_RAYS = 256
-_ROWS = CHUNK // FIRST_RAYS
+ROWS = CHUNK // FIRST_RAYS
 _EVERYWHERE = (np.zeros(1), np.full(1, np.inf))
 
 
@@ -101,7 +101,7 @@ def trace_rows(tracing: Tracing, rows: Integers, known: Known) -> RowHits:
         def trace(begin: int, end: int) -> Iterator[None]:
             yield from _trace_until(tracing, order[begin:end], rows, known, parts)
 
-        for_chunks(trace, len(rows), _ROWS, tracing.threads, update)
+        for_chunks(trace, len(rows), ROWS, tracing.threads, update)
     return _in_order(parts)
 
 
@@ -113,7 +113,7 @@ def _trace_until(
     while len(places):
         rays = keys.shape[1]
         more = min(max(rays, FIRST_RAYS), tracing.max_rays - rays)
-        new = yield from _keys_of(tracing, rows[places], rays, more)
+        new = yield from keys_of(tracing, rows[places], rays, more)
         keys = np.sort(np.concatenate([keys, new], axis=1), axis=1)
         hits, unfinished = _tally(keys, rows[places], known, tracing.rtol, rays + more == tracing.max_rays)
         parts.append((places[~unfinished], hits))
@@ -159,7 +159,7 @@ def _in_order(parts: list[tuple[Integers, RowHits]]) -> RowHits:
     return RowHits(first, *columns, np.concatenate([part.rays for _, part in parts])[order])
 
 
-def _keys_of(tracing: Tracing, rows: Integers, begin: int, count: int) -> Generator[None, None, Integers]:
+def keys_of(tracing: Tracing, rows: Integers, begin: int, count: int) -> Generator[None, None, Integers]:
     """What the rays from ``begin`` on hit, ``count`` of each row: keys as of ``tally_rows``, (rows, count)."""
     keys = np.empty((len(rows), count), np.int64)
     width = min(count, CHUNK)

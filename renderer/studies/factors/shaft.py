@@ -333,14 +333,15 @@ def _least(face, way):
 
 @kernel
 def _covers(shaft, face, which):
-    """Whether a face lies near one polygon's plane, not behind it, and may lie over the polygon."""
+    """Whether a face touches one polygon's plane, is near it, not behind it, and may lie over the polygon."""
     first = shaft.n if which == 1 else 0
     polygon, count = offset(shaft.corners, 3 * first), shaft.m if which == 1 else shaft.n
     normal = row3(shaft.normals, which)
-    height, plane = dot(normal, row3(polygon, 0)), offset(shaft.planes, PLANE * which)
+    height = dot(normal, row3(polygon, 0))
     low, high = _least(face, normal) - height, -_least(face, scale(normal, -1.0)) - height
-    room, near = _room_for(shaft, load(plane, 4), face), _BESIDE * shaft.size
-    if high < -room or high > near or low < -near:
+    # More than a face may enter along any direction.
+    room, near = _DEEPEST * shaft.width, _BESIDE * shaft.size
+    if high < -room or high > near or low < -near or low > room:
         return False
     # In the plane, the edges of both give all directions that part them.
     for k in range(count):

@@ -44,7 +44,8 @@ def tally_rows(keys, known_first, known, rtol, last, targets, counts, errors, le
                  (rows * n,): the targets of each row that do; how many rays hit them; the standard error of that number
                  over n
     lengths      (rows,) int64: how many targets they are
-    unfinished   (rows,) bool: whether the root of the sum of the squared errors is above rtol
+    unfinished   (rows,) bool: whether the root of the sum of the squared errors is above rtol, or all rays hit known
+                 targets, which are not all there is
 
     Returns how many targets are written.
     """
@@ -69,7 +70,7 @@ def tally_rows(keys, known_first, known, rtol, last, targets, counts, errors, le
                 targets[i], counts[i], errors[i] = target, count, error
                 variance, length = variance + error * error, length + 1
             begin = end
-        lengths[row], unfinished[row] = length, variance > rtol * rtol and not last
+        lengths[row], unfinished[row] = length, (variance > rtol * rtol or length == 0) and not last
         if not unfinished[row]:
             written += length
     return written

@@ -137,6 +137,7 @@ BROKEN = {
     "points inside bodies": ("openness", lambda own: lambda *a, **k: own(*a, **k) + 1.0 / 300),
     "hours of sun in a street": ("sun_hours", lambda own: lambda *a, **k: own(*a, **k) + 0.25),
     "weights and distances": ("occlusion", lambda own: lambda *a, distance=0, **k: own(*a, **k)),
+    "light through screens": ("sun_hours", lambda own: lambda *a, transmittance, **k: own(*a, **k)),
     "faces that an eye sees": ("visible_faces", lambda own: lambda *a, **k: ~own(*a, **k)),
     "clouds and depths": ("depth_map", lambda own: lambda *a, **k: own(*a, **k) * (1 + 2.0**-50)),
     "clouds from a roof": ("scan", lambda own: lambda o, p, w: own(o, np.add(p, (0.0, 0.0, 1e-4)), w)),

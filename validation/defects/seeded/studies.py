@@ -46,6 +46,7 @@ _CHANGES: dict[str, Change] = {
     "the whole is without what the horizon hides": Rule("cosine-weight", call("abs", "max(_0, 0.0)")),
     "a list of leaves lacks its last one": Rule("end-of-leaf-list", argument(1, "_ - 1 if _ % 8 > 1 else _")),
     "the leaf that hid a ray hides the next one unasked": Rule("hider-is-tested", value("True")),
+    "a screen takes its share twice": Rule("share-of-pane", value("_ * _")),
     "patches weigh the same at all heights": Rule("cosine-of-patches", value("False")),
     "distances in units of the directions": Wrapped("share.limits_of", _limits_in_directions),
     "every sun stands for an hour": Wrapped("sky.check_weights", _hours_alike),

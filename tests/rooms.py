@@ -3,7 +3,12 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from renderer import Mesh
+from renderer import Mesh, Octree
+from renderer.studies.factors.pairs import exact_pairs
+
+# Two triangles that see each other, one above the other.
+FLOOR = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
+CEILING = np.array([[0, 0, 1], [0, 1, 1], [1, 0, 1]], float)
 
 
 def panel(corner, along, across, count):
@@ -62,13 +67,29 @@ def points_on(triangles, rng):
 
 
 def seen_shares(octree, triangles, pairs, rays, rng):
-    """For each pair, how many of its rays run before both faces, and how many of these hit nothing."""
+    """For each pair, how many of its rays run before both faces, not edge-on, and how many of these hit nothing."""
     first, second = (np.repeat(pairs[:, k], rays) for k in range(2))
     p, q = points_on(triangles[first], rng), points_on(triangles[second], rng)
     normals = normals_of(triangles)
-    before = ((q - p) * normals[first]).sum(axis=1) > 1e-9
-    before &= ((p - q) * normals[second]).sum(axis=1) > 1e-9
+    edge_on = 1e-6 * np.abs(triangles).max()
+    before = ((q - p) * normals[first]).sum(axis=1) > edge_on
+    before &= ((p - q) * normals[second]).sum(axis=1) > edge_on
     open_ = before.copy()
     rows = np.flatnonzero(before)
     open_[rows] = octree.visible(p[rows], q[rows], first[rows], second[rows])
     return before.reshape(-1, rays).sum(axis=1), open_.reshape(-1, rays).sum(axis=1)
+
+
+def known_of(triangles, pairs=None, kind=Octree, **options):
+    pairs = all_pairs(len(triangles)) if pairs is None else pairs
+    return pairs, *exact_pairs(kind(mesh_of(triangles))._built, pairs, 2, **options)
+
+
+def furnished(seed):
+    """A room with a box that stands on the floor, one in the air, and a screen."""
+    shell = box((0, 0, 0), (4, 3, 2.5), 3, True)
+    table = box((1, 1, 0), (2, 1.5, 0.75), 1, False)[1:]
+    lamp = box((2.5, 1, 1.5), (2.75, 1.25, 1.75), 1, False)
+    screen = box((3, 0, 0), (3.001, 1.5, 1.5), 1, False)
+    triangles = np.concatenate([*shell, *table, *lamp, *screen])
+    return turned(triangles, seed) if seed else triangles
