@@ -162,7 +162,6 @@ def _marked(
     alike = (emitted[one] == emitted[other]).all(axis=1) & (rho[one] == rho[other]).all(axis=1)
     change = np.abs(found.values[one] - found.values[other]).max(axis=1)
     mean = float((areas[:, None] * (found.values - emitted)).sum() / (3.0 * areas.sum()))
-    # rule: cut-where-it-changes
     due = alike & (change * sides > limit * mean)
     marked = np.zeros(len(patches.faces), np.bool_)
     marked[one[due]] = marked[other[due]] = True

@@ -132,7 +132,6 @@ def _means(mesh: Mesh, group: Ints, rows: Floats) -> Floats:
     count = int(group.max(initial=-1)) + 1
     areas = np.repeat(face_areas(mesh), 3)
     flat = np.bincount(group, areas, count) == 0.0
-    # rule: colour-by-area
     weights = np.where(flat[group], 1.0, areas)
     total = np.bincount(group, weights, count)
     shares = weights / total[group]

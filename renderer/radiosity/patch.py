@@ -104,7 +104,6 @@ def patches(mesh: Mesh, edge: float) -> Patches:
     found = Patches(mesh, read_only(np.arange(len(mesh.faces), dtype=np.int64)))
     while True:
         edges = _Edges(found.mesh)
-        # rule: cut-by-own-length
         cut = edges.lengths > float(length)
         if not cut.any():
             return found
@@ -157,7 +156,6 @@ def refined(patches: Patches, marked: ArrayLike) -> Patches:
     cut[edges.number[given]] = True
     own = np.take_along_axis(edges.number, edges.longest[:, None], axis=1)[:, 0]
     while True:
-        # rule: longest-edge-too
         due = own[cut[edges.number].any(axis=1)]
         if cut[due].all():
             return _cut("marked", patches, edges, cut)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from renderer.arguments.arrays import flag_argument
 from renderer.arguments.types import ArrayLike
+from renderer.errors import expect
 from renderer.queryable import Queries
 from renderer.radiosity.solve import check_rtol
 from renderer.radiosity.surfaces import check_channels, check_factors, check_sky, reject_rows
@@ -155,7 +156,6 @@ class Shooting(Iterator[Shot]):
         power = self._unshot.sum(axis=1) * self._areas
         if power.sum() <= self._rtol * self._first:
             raise StopIteration
-        # rule: brightest-first
         brightest = int(power.argmax())
         surfaces, shares = self._rows.row(brightest)
         gain = self._rho[surfaces] * self._unshot[brightest]
@@ -206,7 +206,13 @@ class _Known:
 
     def __init__(self, factors: ViewFactors) -> None:
         exchange = check_factors(factors)
-        self.areas, self._sky, self._exchange = exchange.areas, exchange.sky, exchange.matrix
+        expect(
+            factors.errors is not None,
+            "scene",
+            "an octree, or view factors with form='matrix'",
+            "some without a matrix",
+        )
+        self.areas, self._sky, self._exchange = exchange.areas, exchange.sky, factors.exchange
 
     def row(self, surface: int) -> _Row:
         entries = slice(*self._exchange.indptr[surface : surface + 2].tolist())

@@ -153,15 +153,13 @@ def radiosity(
     Notes
     -----
     SciPy's conjugate gradients solve the symmetric form of the system, in all channels at once. An iteration takes one
-    product with the exchange matrix, which stays sparse. If rows have the sum 1, no error is larger than the largest
-    residual over 1 - max(rho); the rounding of the residual is added to it. The last bits depend on NumPy's library of
-    linear algebra and its threads.
+    product with the exchange: a sparse matrix, or an operator if view factors have ``form="rays"``. If rows have the
+    sum 1, no error is larger than the largest residual over 1 - max(rho); the rounding of the residual is added to it.
+    The last bits depend on NumPy's library of linear algebra and its threads.
 
     References
     ----------
     Goral, Torrance, Greenberg, Battaile, Modeling the interaction of light between diffuse surfaces, 1984.
-
-    Neumann, Neumann, Radiosity and hybrid methods, 1995, on the symmetric form.
 
     Examples
     --------

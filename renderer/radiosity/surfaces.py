@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from renderer.arguments.arrays import real_argument
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
+from renderer.studies.factors.free import RayExchange
 from renderer.studies.factors.result import ViewFactors
 
 if TYPE_CHECKING:
@@ -18,6 +19,9 @@ else:
     csr_array = Any
 
 Floats = NDArray[np.float64]
+
+# Rows of rays that are counted together: NumPy makes int64 of them, some dozens of megabytes.
+_BLOCK = 1 << 14
 
 
 class Exchange(NamedTuple):
@@ -30,7 +34,7 @@ class Exchange(NamedTuple):
     """
 
     areas: Floats
-    matrix: csr_array
+    matrix: csr_array | RayExchange
     sky: Floats
     rows: Floats
     slack: float
@@ -48,16 +52,27 @@ def check_factors(factors: object) -> Exchange:
     expect(sky.shape == (n,), "factors", f"a share of sky for each surface, shape ({n},)", f"shape {sky.shape}")
     reject_rows("factors", "areas that are finite and > 0", areas, ~((areas > 0.0) & (areas < np.inf)))
     reject_rows("factors", "shares of sky >= 0", sky, ~((sky >= 0.0) & (sky < np.inf)))
-    # A sum of k numbers >= 0, and the operations around it, err by a share of at most k + 8 roundings (Higham, Accuracy
-    # and Stability of Numerical Algorithms, 2002, section 4.2).
-    longest = n
     if hasattr(matrix, "indptr"):
         least = float(matrix.data.min(initial=0.0))
         expect(least >= 0.0 and bool(np.isfinite(matrix.data).all()), "factors", "exchanges >= 0, finite", f"{least}")
-        longest = int(np.diff(matrix.indptr).max(initial=0))
-    slack = (longest + 8) * float(np.finfo(np.float64).eps)
+    # A sum of k numbers >= 0, with the operations around it, errs by a share of at most k + 12 roundings (Higham,
+    # Accuracy and Stability of Numerical Algorithms, 2002, section 4.2).
+    slack = (_terms_of(matrix, n) + 12) * float(np.finfo(np.float64).eps)
     rows = np.asarray(matrix @ np.ones((n, 1)))[:, 0] / areas
     return Exchange(areas, matrix, sky, rows, slack)
+
+
+def _terms_of(matrix: csr_array | RayExchange, n: int) -> int:
+    """The most terms of a row of its product."""
+    if hasattr(matrix, "indptr"):
+        return int(np.diff(matrix.indptr).max(initial=0))
+    if not isinstance(matrix, RayExchange):
+        return n
+    # The rays that leave a surface, and those that end on it.
+    arriving = np.zeros(n, np.int64)
+    for begin in range(0, n, _BLOCK):
+        arriving += np.bincount(matrix.targets[begin : begin + _BLOCK].ravel(), minlength=n + 2)[:n]
+    return matrix.targets.shape[1] + int(arriving.max(initial=0))
 
 
 def check_channels(argument: str, values: ArrayLike, n: int) -> Floats:

@@ -69,7 +69,6 @@ def solved(system: System, amplification: float, rtol: float, max_iterations: in
         iterations += used
         found = _with_bound(system, weights * z.reshape(wanted.shape), amplification, iterations)
         largest = float(found.values.max(initial=0.0))
-        # rule: stop-by-bound
         if found.bound <= rtol * largest:
             return found
         least = _rounding(system.exchange, largest) * amplification / largest
@@ -87,7 +86,7 @@ def amplification_of(system: System) -> float:
 
     All terms of that inverse, 1 + rho F + (rho F)^2 + ..., are >= 0, so it is 1 / (1 - q) for the largest row sum q of
     rho F, if that is below 1. Otherwise any w >= 0 for which no entry of (1 - rho F) w is below d > 0 gives the bound
-    max(w) / d (Varga, Matrix Iterative Analysis, 1962, section 3.5, on M-matrices). Infinite if no such w is found.
+    max(w) / d (Varga, Matrix Iterative Analysis, 1962, on M-matrices). Infinite if no such w is found.
     """
     exchange = system.exchange
     q = float((system.reflectance * exchange.rows[:, None]).max(initial=0.0)) * (1.0 + exchange.slack)
@@ -148,7 +147,6 @@ def _with_bound(system: System, returned: Floats, amplification: float, iteratio
     values = source + np.maximum(returned, 0.0)
     gathered = _gathered(exchange, values)
     residual = float(np.abs((source - values) + system.reflectance * gathered).max(initial=0.0))
-    # rule: proven-bound
     bound = (residual + _rounding(exchange, float(values.max(initial=0.0)))) * amplification
     return Solution(values, gathered, residual, bound, iterations)
 

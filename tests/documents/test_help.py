@@ -14,7 +14,7 @@ def test_help_is_short_and_names_all_that_is_public() -> None:
     assert 40 < len(text.splitlines()) < 120
     absent = [name for name in renderer.__all__ if not re.search(rf"\b{name}\b", text)]
     assert absent in ([], ["__version__"])
-    assert all(f"renderer.{package}" in text for package in ("studies", "cluster", "trimesh_ray"))
+    assert all(f"renderer.{package}" in text for package in ("studies", "radiosity", "cluster", "trimesh_ray"))
 
 
 def test_all_public_names_are_imported_by_a_star() -> None:

@@ -218,6 +218,21 @@ def test_iterations_are_counted_and_limited_over_all_tries(monkeypatch):
     np.testing.assert_array_equal(found.values, whole.values)
 
 
+def test_no_surface_sends_less_than_it_emits(monkeypatch):
+    """However far from the solution conjugate gradients end; the bound knows how far."""
+    factors, emission, rho, _ = drawn(6, 20)
+    iterate = system._iterate
+
+    def below(*arguments):
+        z, count = iterate(*arguments)
+        return z - 1e-3, count
+
+    monkeypatch.setattr(system, "_iterate", below)
+    found = radiosity(factors, emission, rho, rtol=0.5)
+    assert (found.values >= emission).all()
+    assert 0.0 < np.abs(found.values - dense(factors, emission, rho)).max() <= found.bound
+
+
 def test_the_exchange_may_be_an_operator():
     factors, emission, rho, sky = drawn(3, 25)
     free = replace(factors, exchange=aslinearoperator(factors.exchange))
