@@ -16,7 +16,7 @@ _OUTPUT = (
 )
 _PICTURES = (".png", ".exr", ".npy")
 _EDGE = "the longest edge of a patch, in scene units: shadows are no sharper; default: 1/24 of the scene's longest side"
-_RTOL = "the error that view factors may have, as a share of the largest of their patch; default: 0.02"
+_RTOL = "the share of what a patch sends that may arrive at others than it should; default: 0.05"
 _CREASE = "blend colours over edges of at most this angle; default: 30"
 _UP = "the axis of mesh files that points up (default: y); a scene file has the key up"
 
@@ -33,7 +33,7 @@ def add_radiosity(commands: Any) -> None:
     command.add_argument("--up", choices=("x", "y", "z"), help=_UP)
     command.add_argument("-o", "--output", type=Path, required=True, action="append", metavar="FILE", help=_OUTPUT)
     command.add_argument("--edge", type=float, metavar="LENGTH", help=_EDGE)
-    command.add_argument("--rtol", type=float, default=0.02, metavar="R", help=_RTOL)
+    command.add_argument("--rtol", type=float, default=0.05, metavar="R", help=_RTOL)
     command.add_argument("--max-rays", type=int, default=1 << 16, metavar="N", help="rays of a patch at most")
     command.add_argument("--crease", type=float, default=30.0, metavar="DEGREES", help=_CREASE)
     command.add_argument("--resolution", type=resolution, metavar="WxH", help="of a picture, in pixels")

@@ -48,7 +48,7 @@ def lit_scene(
     scene: Scene,
     edge: float | None = None,
     *,
-    rtol: float = 0.02,
+    rtol: float = 0.05,
     max_rays: int = 1 << 16,
     crease: float = 30.0,
     threads: int | None = None,
@@ -62,7 +62,8 @@ def lit_scene(
     edge : float, optional
         The longest edge of a patch, in scene units. Shadows are no sharper. By default 1/24 of the scene's longest
         side.
-    rtol : float, default 0.02
+    rtol : float, default 0.05
+        As for `view_factors`: by how much the light that reaches a patch may err. Errors of many patches cancel.
     max_rays : int, default 65536
         As for `view_factors`.
     crease : float, default 30
