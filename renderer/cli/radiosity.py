@@ -15,7 +15,7 @@ _OUTPUT = (
     "beside it; .ply or .glb: a mesh with colours for other programs; may be given again"
 )
 _PICTURES = (".png", ".exr", ".npy")
-_EDGE = "the longest edge of a patch, in scene units: shadows are no sharper; default: 1/24 of the scene's longest side"
+_EDGE = "the longest edge of a patch, in scene units: shadows are no sharper; default: 1/16 of the scene's longest side"
 _RTOL = "the share of what a patch sends that may arrive at others than it should; default: 0.05"
 _CREASE = "blend colours over edges of at most this angle; default: 30"
 _UP = "the axis of mesh files that points up (default: y); a scene file has the key up"

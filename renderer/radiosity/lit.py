@@ -31,7 +31,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 # Patches along the longest side of the scene by default: of a room some thousands in all, which take seconds.
-_ALONG = 24
+_ALONG = 16
 # The share of all light that may end on backs of faces: floors under what stands on them, plates without a thickness.
 _ON_BACKS = 0.25
 
@@ -60,10 +60,10 @@ def lit_scene(
     ----------
     scene : Scene
     edge : float, optional
-        The longest edge of a patch, in scene units. Shadows are no sharper. By default 1/24 of the scene's longest
+        The longest edge of a patch, in scene units. Shadows are no sharper. By default 1/16 of the scene's longest
         side.
     rtol : float, default 0.05
-        As for `view_factors`: by how much the light that reaches a patch may err. Errors of many patches cancel.
+        As for `view_factors`: the share of what a patch sends that may arrive elsewhere.
     max_rays : int, default 65536
         As for `view_factors`.
     crease : float, default 30

@@ -100,7 +100,7 @@ def test_the_default_edge_is_a_share_of_the_scene(folder: Path, monkeypatch: pyt
     sound = patch.patches
     monkeypatch.setattr(patch, "patches", lambda mesh, edge: asked.append(edge) or sound(mesh, 0.5))
     run("-o", "a.npy", "--rtol", 0.5)
-    assert asked == [pytest.approx(1 / 24)] * 2
+    assert asked == [pytest.approx(1 / 16)] * 2
 
 
 @cases(("words", "size", "samples"), [(["--resolution", "6x4"], (6, 4), 1), (["--samples", "4"], (12, 8), 4)])
