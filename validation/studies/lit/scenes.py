@@ -34,18 +34,18 @@ def room() -> Scene:
 
 
 def yard() -> Scene:
-    """A block on the ground beside a wall, under a uniform sky, the sun and a lamp."""
+    """A block on the ground, under a uniform sky, the sun and a lamp."""
     ground = grid(4, 4, (4.0, 4.0))
     block = box((-0.4, 0.0, -0.4), (0.4, 0.7, 0.3))
     standing = Mesh(block.vertices, block.faces[block.face_normals()[:, 1] > -0.5])
     materials = {"ground": Phong(diffuse=0.6), "block": Phong(diffuse=(0.7, 0.4, 0.2))}
     things = [SceneObject(mesh=ground, material="ground"), SceneObject(mesh=standing, material="block")]
     lights = (
-        DirectionalLight(direction=(-0.5, -1.0, -0.3), irradiance=(0.6, 0.55, 0.4)),
-        PointLight(position=(-0.9, 0.8, 0.9), intensity=(0.2, 0.2, 0.3)),
+        DirectionalLight(direction=(0.8, -1.0, 0.3), irradiance=(0.9, 0.8, 0.6)),
+        PointLight(position=(0.5, 0.9, 1.5), intensity=(0.5, 0.5, 0.8)),
     )
     eye = PerspectiveCamera(eye=(1.6, 1.7, 2.2), target=(0.0, 0.2, 0.0), fov=40.0)
-    return Scene(camera=eye, materials=materials, objects=things, lights=lights, background=(0.3, 0.4, 0.5))
+    return Scene(camera=eye, materials=materials, objects=things, lights=lights, background=(0.15, 0.2, 0.25))
 
 
 # Each with the longest edge of its patches, and of those of a short run.
