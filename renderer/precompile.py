@@ -34,6 +34,10 @@ from renderer.scene.light import PointLight
 from renderer.scene.needs import needs_of
 from renderer.scene.scene import Scene, SceneObject
 from renderer.shade.tile import render_tile
+from renderer.studies.factors.compute import checked_tracing
+from renderer.studies.factors.free import without_matrix
+from renderer.studies.factors.rows import nothing_known, trace_rows
+from renderer.studies.factors.work import face_pairs
 from renderer.studies.hidden import occlusion
 from renderer.studies.scanner import scan
 from renderer.studies.views import visible_faces
@@ -41,6 +45,8 @@ from renderer.system import child
 from renderer.system.threads import available_threads
 
 _TRIANGLE = Mesh([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0, 1, 2]])
+# Two triangles that see each other.
+_FACING = Mesh([*_TRIANGLE.vertices, [0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 0.0, 1.0]], [[0, 1, 2], [3, 4, 5]])
 # An icosphere of 20,480 faces: enough that its tree is built in parts, and quickly.
 _SUBDIVISIONS = 5
 _GLASS = Dielectric(type="dielectric", ior=1.5)
@@ -116,6 +122,17 @@ def _study() -> None:
     # The face is seen edge-on, and the scanner stands on it.
     visible_faces(octree, [9.0, 0.1, 0.0])
     scan(octree, [0.1, 0.1, 0.0], [[0.0, 0.0, 1.0]])
+    _exchange()
+
+
+def _exchange() -> None:
+    # Not by view_factors, which needs SciPy.
+    for accelerator in (Octree.from_mesh(_FACING), BruteForce.from_mesh(_FACING)):
+        # The rays that one face lets through start again.
+        tracing = checked_tracing(accelerator, sides="both", transmittance=[0.5, 0.0], max_rays=256)
+        trace_rows(tracing, np.arange(2), nothing_known(2))
+        face_pairs(tracing, np.array([[0, 1]]))
+        without_matrix(tracing)
 
 
 def _search() -> None:

@@ -1,20 +1,14 @@
-"""The parts of a long run on disk, so that a killed run goes on where it stopped.
+"""The rows of a long run in parts of equal size on disk, so that a killed run goes on where it stopped.
 
-A folder beside the result has ``manifest.json``, which says what is computed from what, and a file for each finished
-part: its rows, then the SHA-256 of the manifest, the number of the part and the rows. Files are written beside and
-renamed, so a part is whole or absent. A damaged part and one of another run count as absent. When all parts are there,
-the result is made of them and the folder removed.
-
-The rows of a part need not follow each other in the result: an order says which row of it each place of the parts is.
+When all parts are there, the result is made of them and the folder removed. The rows of a part need not follow each
+other in the result: an order says which row of it each place of the parts is.
 """
 
 from __future__ import annotations
 
 import hashlib
-import json
-import shutil
 from collections.abc import Callable, Generator, Iterator, Mapping
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -22,11 +16,10 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.checkpoints.folder import RunFolder, remove_parts
 from renderer.system.files import write_atomically
 from renderer.system.terminal import progress_bar
 
-_MANIFEST = "manifest.json"
-_DIGEST_BYTES = 32
 # The number and the values of a part.
 Computed = Generator[tuple[int, NDArray[Any]], None, None]
 # Of a result that is written at once, where its rows are not in the order of the parts.
@@ -81,22 +74,11 @@ class Parts:
         Raises ``ValueError`` if the folder is that of another plan, and says what differs.
         """
         self.folder, self.plan, self.order = folder, plan, order
-        self._manifest = json.dumps(asdict(plan), indent=1, sort_keys=True).encode()
-        path = folder / _MANIFEST
-        if not path.exists():
-            folder.mkdir(parents=True, exist_ok=True)
-            write_atomically(path, lambda file: file.write(self._manifest))
-            return
-        differing = _differing(_read_manifest(path), json.loads(self._manifest))
-        if differing:
-            raise ValueError(
-                f"{folder}: expected the parts of this run, got those of another, whose {', '.join(differing)} "
-                "differ; remove the folder to begin anew"
-            )
+        self._files = RunFolder(folder, asdict(plan))
 
     def missing(self) -> list[int]:
         """The parts that are still to be computed."""
-        return [part for part in range(self.plan.parts) if self._read(part) is None]
+        return [part for part in range(self.plan.parts) if self._files.read(_name(part)) is None]
 
     def complete(self, compute: Callable[[list[int]], Computed], unit: str, progress: bool) -> None:
         """Compute the missing parts and write each when it is done; what is written stays, whatever ends the rest.
@@ -121,12 +103,12 @@ class Parts:
     def write(self, part: int, values: NDArray[Any]) -> None:
         """Keep a part; of the shape and type of the plan."""
         assert values.shape == self.plan.shape(self.plan.length(part)) and values.dtype == self.plan.dtype
-        content = np.ascontiguousarray(values).tobytes()
-        write_atomically(self._path(part), lambda file: file.write(content + self._digest(part, content)))
+        self._files.write(_name(part), np.ascontiguousarray(values).tobytes())
 
     def read(self, part: int) -> NDArray[Any]:
         """The values of a part. Raises ``OSError`` if it is absent."""
-        return np.frombuffer(self._whole(part), self.plan.dtype).reshape(self.plan.shape(self.plan.length(part)))
+        values = np.frombuffer(self._files.whole(_name(part)), self.plan.dtype)
+        return values.reshape(self.plan.shape(self.plan.length(part)))
 
     def join(self, path: Path) -> None:
         """Write the result as ``.npy``, block by block. Raises ``OSError`` if a part is absent."""
@@ -168,36 +150,9 @@ class Parts:
                     values[rows[here]] = self.read(part)[here]
             yield values
 
-    def _whole(self, part: int) -> bytes:
-        content = self._read(part)
-        if content is None:
-            raise OSError(f"{self._path(part)}: expected a whole part of the run, got none")
-        return content
 
-    def _read(self, part: int) -> bytes | None:
-        """The values of a part; None if it is absent or damaged."""
-        try:
-            content = self._path(part).read_bytes()
-        except FileNotFoundError:
-            return None
-        values, digest = content[:-_DIGEST_BYTES], content[-_DIGEST_BYTES:]
-        size = self.plan.length(part) * max(1, self.plan.width) * np.dtype(self.plan.dtype).itemsize
-        return values if len(values) == size and self._digest(part, values) == digest else None
-
-    def _digest(self, part: int, values: bytes) -> bytes:
-        found = hashlib.sha256(self._manifest)
-        found.update(f"{part};".encode())
-        found.update(values)
-        return found.digest()
-
-    def _path(self, part: int) -> Path:
-        return self.folder / f"{part:08d}.part"
-
-
-def remove_parts(folder: Path) -> None:
-    """Remove the folder of a run, or what is left of it."""
-    with suppress(FileNotFoundError):
-        shutil.rmtree(folder)
+def _name(part: int) -> str:
+    return f"{part:08d}"
 
 
 def digest_of(*arrays: NDArray[Any]) -> str:
@@ -207,20 +162,3 @@ def digest_of(*arrays: NDArray[Any]) -> str:
         found.update(f"{array.shape} {array.dtype.str};".encode())
         found.update(np.ascontiguousarray(array).data)
     return found.hexdigest()
-
-
-def _read_manifest(path: Path) -> dict[str, Any]:
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, UnicodeDecodeError):
-        found = None
-    if not isinstance(found, dict):
-        raise ValueError(f"{path}: expected the manifest of a run, got something else; remove its folder")
-    return found
-
-
-def _differing(stored: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
-    """The names of what is not the same in two manifests, those of ``made_of`` by their own names."""
-    flat = [dict(m) | (m["made_of"] if isinstance(m.get("made_of"), dict) else {}) for m in (stored, wanted)]
-    names = [n for n in sorted(flat[0].keys() | flat[1].keys()) if n != "made_of"]
-    return [n.replace("_", " ") for n in names if flat[0].get(n) != flat[1].get(n)]

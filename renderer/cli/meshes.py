@@ -1,4 +1,4 @@
-"""The meshes of a study: their files, the axis that points up, how much light they let through, and their values."""
+"""The meshes of a study: their files, the axis that points up, and the values of each file."""
 
 from __future__ import annotations
 
@@ -35,51 +35,11 @@ def kept_of(paths: Sequence[Path], hidden: Sequence[str]) -> list[Path]:
     expect(are_apart(paths), "mesh", "each file once", ", ".join(map(str, paths)))
     kept = list(paths)
     for pattern in hidden:
-        named = _named(paths, pattern, "--hide")
+        named = [path for path in paths if path == Path(pattern) or fnmatchcase(path.name, pattern)]
+        expect(bool(named), "--hide", "the name of a mesh file, or a pattern of names", repr(pattern))
         kept = [path for path in kept if path not in named]
     expect(bool(kept), "--hide", "one file at least that is left", "none")
     return kept
-
-
-def _named(paths: Sequence[Path], pattern: str, option: str) -> list[Path]:
-    """The files of a name or pattern, at least one."""
-    named = [path for path in paths if path == Path(pattern) or fnmatchcase(path.name, pattern)]
-    expect(bool(named), option, "the name of a mesh file, or a pattern of names", repr(pattern))
-    return named
-
-
-def transmittance_of(files: Files, given: Sequence[str]) -> Any:
-    """The transmittance (F,) of all faces: by names of files, or from an array in an ``.npy`` file; the last wins."""
-    import numpy as np
-
-    from renderer.studies.points import read_array
-    from renderer.studies.translucent import check_transmittance
-
-    option, shares = "--transmittance", np.zeros(len(files.mesh.faces))
-    for word in given:
-        if is_array(word):
-            shares = check_transmittance(option, read_array(option, Path(word)), len(shares))
-            continue
-        pattern, _, value = word.rpartition("=")
-        share = _share(value, word, option)
-        for path in _named(files.paths, pattern, option):
-            place = files.paths.index(path)
-            shares[files.faces[place] : files.faces[place + 1]] = share
-    return shares
-
-
-def _share(value: str, word: str, option: str) -> float:
-    try:
-        share = float(value)
-    except ValueError:
-        share = -1.0
-    expect(0.0 <= share <= 1.0, option, "NAME=VALUE with a number from 0 to 1, or an .npy file", repr(word))
-    return share
-
-
-def is_array(word: str) -> bool:
-    """Whether a word of ``--transmittance`` names a file."""
-    return word.lower().endswith(".npy")
 
 
 def load_files(paths: list[Path]) -> Files:

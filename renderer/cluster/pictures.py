@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from renderer.arguments.split import SPLIT, Split
-from renderer.checkpoints.parts import remove_parts
+from renderer.checkpoints.folder import remove_parts
 from renderer.checkpoints.pictures import Picture, PictureRun, checked_band, digest_of_scene
 from renderer.cluster.tasks import Results, Task, results
 from renderer.cluster.workers import SentScene, render_rows

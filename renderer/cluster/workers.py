@@ -17,7 +17,8 @@ from renderer.picture.prepare import PreparedScene, prepare_scene
 from renderer.scene.needs import Features
 from renderer.scene.scene import Scene
 
-# The trees of a worker, by the digests of what they are over; the latest ones, because a worker serves many runs.
+# The trees of a worker and what goes with them, by digests of what they are made of; the latest ones, because a worker
+# serves many runs.
 _MOST = 2
 _TREES: dict[str, Any] = {}
 _LOCK = threading.Lock()
@@ -42,7 +43,7 @@ class SentMesh(NamedTuple):
             mesh = Mesh(np.array(self.vertices), np.array(self.faces))
             return Octree.from_mesh(mesh, split=self.split, threads=1)
 
-        octree: Octree = _kept(f"{self.digest} {self.split}", build)
+        octree: Octree = kept(f"{self.digest} {self.split}", build)
         return octree
 
 
@@ -64,7 +65,7 @@ class SentScene(NamedTuple):
         def prepare() -> PreparedScene:
             return prepare_scene(self.scene, self.needs, self.accelerator, self.split, threads=1)
 
-        prepared: PreparedScene = _kept(f"{self.digest} {self.needs} {self.accelerator} {self.split}", prepare)
+        prepared: PreparedScene = kept(f"{self.digest} {self.needs} {self.accelerator} {self.split}", prepare)
         return prepared
 
 
@@ -78,7 +79,8 @@ class SentStudy(NamedTuple):
     study: Any
 
 
-def _kept(key: str, make: Callable[[], Any]) -> Any:
+def kept(key: str, make: Callable[[], Any]) -> Any:
+    """What this process has under a key, or makes now while other threads wait; ``make`` must not call this."""
     with _LOCK:
         if key not in _TREES:
             while len(_TREES) >= _MOST:

@@ -33,8 +33,6 @@ class Balance(NamedTuple):
         What arrives and is not reflected.
     to_sky : ndarray of float64, shape (3,)
         What leaves the scene.
-    to_backs : ndarray of float64, shape (3,)
-        What ends on backs of faces, which do not receive.
 
     Examples
     --------
@@ -51,7 +49,6 @@ class Balance(NamedTuple):
     from_sky: Floats
     absorbed: Floats
     to_sky: Floats
-    to_backs: Floats
 
     @property
     def error(self) -> Floats:
@@ -66,7 +63,7 @@ class Balance(NamedTuple):
         >>> radiosity(view_factors(Octree.from_mesh(box())), emission=1.0, reflectance=0.5).balance.error
         array([0., 0., 0.])
         """
-        return (self.emitted + self.from_sky) - (self.absorbed + self.to_sky + self.to_backs)
+        return (self.emitted + self.from_sky) - (self.absorbed + self.to_sky)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +149,9 @@ def radiosity(
 
     Notes
     -----
+    The part of a surface that sees backs of faces, ``factors.backs``, is taken to lie inside a body: it neither sends
+    nor receives.
+
     SciPy's conjugate gradients solve the symmetric form of the system, in all channels at once. An iteration takes one
     product with the exchange: a sparse matrix, or an operator if view factors have ``form="rays"``. If rows have the
     sum 1, no error is larger than the largest residual over 1 - max(rho); the rounding of the residual is added to it.
@@ -189,7 +189,7 @@ def radiosity(
     amplification = amplification_of(system)
     expect(amplification < math.inf, "factors", "rows whose sum is at most 1", f"{exchange.rows.max():.6g}")
     found = solved(system, amplification, tolerance, most)
-    balance = _balance(exchange, factors.backs, emitted, rho, from_sky, found)
+    balance = _balance(exchange, emitted, rho, from_sky, found)
     values, irradiance = (_in_three(columns) for columns in (found.values, found.gathered + from_sky))
     return Radiosity(values, irradiance, found.residual, found.bound, found.iterations, balance)
 
@@ -201,17 +201,14 @@ def check_rtol(rtol: float) -> float:
     return float(given)
 
 
-def _balance(
-    exchange: Exchange, backs: Floats, emitted: Floats, rho: Floats, from_sky: Floats, found: Solution
-) -> Balance:
+def _balance(exchange: Exchange, emitted: Floats, rho: Floats, from_sky: Floats, found: Solution) -> Balance:
     arriving = found.gathered + from_sky
-    leaving = found.values * exchange.areas[:, None]
+    leaving = found.values * exchange.powers[:, None]
     powers = (
-        exchange.areas[:, None] * emitted,
-        exchange.areas[:, None] * from_sky,
-        exchange.areas[:, None] * ((1.0 - rho) * arriving),
+        exchange.powers[:, None] * emitted,
+        exchange.powers[:, None] * from_sky,
+        exchange.powers[:, None] * ((1.0 - rho) * arriving),
         exchange.sky[:, None] * leaving,
-        backs[:, None] * leaving,
     )
     return Balance(*(_in_three(power.sum(axis=0)) for power in powers))
 

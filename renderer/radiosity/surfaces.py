@@ -19,6 +19,8 @@ else:
     csr_array = Any
 
 Floats = NDArray[np.float64]
+# A surface of which no more is left sees nothing but backs: some roundings of sums that are 1.
+_WHOLE = 1e-9
 
 # Rows of rays that are counted together: NumPy makes int64 of them, some dozens of megabytes.
 _BLOCK = 1 << 14
@@ -27,13 +29,15 @@ _BLOCK = 1 << 14
 class Exchange(NamedTuple):
     """View factors as a system of equations reads them.
 
-    areas   (n,)
+    areas   (n,), those that are not behind backs of faces; of a surface that is there whole, its whole area
+    powers  (n,), the same, but 0 for such a surface, which neither sends nor receives
     matrix  (n, n), A_i F_ij, symmetric: anything that multiplies (n, c) by @
     sky     (n,), the share of each row that the sky fills
     rows    (n,), the sum of each row of F, and slack, the share of it by which rounding may have moved a product
     """
 
     areas: Floats
+    powers: Floats
     matrix: csr_array | RayExchange
     sky: Floats
     rows: Floats
@@ -52,6 +56,10 @@ def check_factors(factors: object) -> Exchange:
     expect(sky.shape == (n,), "factors", f"a share of sky for each surface, shape ({n},)", f"shape {sky.shape}")
     reject_rows("factors", "areas that are finite and > 0", areas, ~((areas > 0.0) & (areas < np.inf)))
     reject_rows("factors", "shares of sky >= 0", sky, ~((sky >= 0.0) & (sky < np.inf)))
+    # rule: area-behind-backs
+    powers = np.where(factors.backs < 1.0 - _WHOLE, areas * (1.0 - factors.backs), 0.0)
+    areas = np.where(powers > 0.0, powers, areas)
+    sky = sky * (factors.areas / areas)
     if hasattr(matrix, "indptr"):
         least = float(matrix.data.min(initial=0.0))
         expect(least >= 0.0 and bool(np.isfinite(matrix.data).all()), "factors", "exchanges >= 0, finite", f"{least}")
@@ -59,7 +67,7 @@ def check_factors(factors: object) -> Exchange:
     # Accuracy and Stability of Numerical Algorithms, 2002, section 4.2).
     slack = (_terms_of(matrix, n) + 12) * float(np.finfo(np.float64).eps)
     rows = np.asarray(matrix @ np.ones((n, 1)))[:, 0] / areas
-    return Exchange(areas, matrix, sky, rows, slack)
+    return Exchange(areas, powers, matrix, sky, rows, slack)
 
 
 def _terms_of(matrix: csr_array | RayExchange, n: int) -> int:

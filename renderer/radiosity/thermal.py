@@ -112,7 +112,8 @@ def net_heat(
     Notes
     -----
     A surface loses A e (sigma T^4 - H), for its irradiance H and emissivity e. Each has one temperature and one
-    irradiance: cut large surfaces by `patches`. A gas between them is not there.
+    irradiance: cut large surfaces by `patches`. A gas between them is not there. The part of a surface that sees backs
+    of faces, ``factors.backs``, is taken to lie inside a body: it neither sends nor receives.
 
     References
     ----------
@@ -154,10 +155,10 @@ def net_heat(
     expect(amplification < math.inf, "factors", expected, "a system that is as good as singular")
     found = solved(system, amplification, check_rtol(rtol), count_argument("max_iterations", max_iterations, 1))
     leaving, arriving = found.values[:, 0], found.gathered[:, 0] + above
-    flux = share * (emitted - arriving) + 0.0  # without the sign of a zero
+    flux = np.where(exchange.powers > 0.0, share * (emitted - arriving), 0.0) + 0.0  # without the sign of a zero
     degrees = np.where(adiabatic, (arriving / SIGMA) ** 0.25, degrees)
-    to_sky = float((exchange.areas * (exchange.sky * leaving - above)).sum())
-    net = read_only(exchange.areas * flux)
+    to_sky = float((exchange.powers * (exchange.sky * leaving - above)).sum())
+    net = read_only(exchange.powers * flux)
     flux, degrees, leaving, arriving = (read_only(row) for row in (flux, degrees, np.array(leaving), arriving))
     return Heat(net, flux, degrees, leaving, arriving, to_sky, found.bound, found.iterations)
 

@@ -24,14 +24,16 @@ OF_POINTS = {"octree", "points", "normals", "leaving", "threads", "progress"} | 
 SUNS = {"sun_directions": np.array([[1.0, 0.2, 0.7], [-0.6, 0.5, 0.4]]), "weights": np.array([2.0, 3.5])}
 PATTERN = tregenza()._replace(weights=np.arange(145.0))
 USUAL: dict[str, dict[str, Any]] = {"sky": {}, "sun": SUNS, "ao": {}}
+SHARES = [[0.25] * len(scenery().faces), np.linspace(0.0, 1.0, len(scenery().faces))]
 # Another value for each option of each kind, or several in all forms that it may have.
 OTHERS: dict[str, dict[str, list[Any]]] = {
     "sky": {"patches": [100, np.int64(101), PATTERN, PATTERN._replace(weights=np.arange(145.0)[::-1])],
             "up": ["x", (0.3, 0.0, 1.0), [0.0, 0.3, 1.0], np.array([0.2, 0.3, 1.0])], "definition": ["geometric"],
-            "max_distance": [0.6]},
+            "max_distance": [0.6], "transmittance": SHARES},
     "sun": {"sun_directions": [SUNS["sun_directions"][::-1], [np.array([0.0, 0.3, 1.0]), np.array([0.4, 0.0, 1.0])]],
-            "weights": [np.array([3.5, 2.5])], "max_distance": [np.float32(0.6)], "up": ["x", (-0.6, 0.5, 0.4)]},
-    "ao": {"samples": [64], "max_distance": [0.6]},
+            "weights": [np.array([3.5, 2.5])], "max_distance": [np.float32(0.6)], "up": ["x", (-0.6, 0.5, 0.4)],
+            "transmittance": SHARES},
+    "ao": {"samples": [64], "max_distance": [0.6], "transmittance": SHARES},
 }  # fmt: skip
 
 
@@ -158,4 +160,4 @@ def test_a_run_answers_as_the_function_and_takes_over_no_part_of_another(
 def test_workers_build_the_tree_that_is_asked_for(tmp_path: Path, tasks: list[Any], split: Any) -> None:
     asked = usual("sky")
     run_on(None, Octree.from_mesh(MESH), asked.study, asked.points, tmp_path / "parts", size=5, split=split)
-    assert len(tasks) == -(-len(POINTS) // 5) and {task.shared.split for task in tasks} == {split}
+    assert len(tasks) == -(-len(POINTS) // 5) and {task.shared.mesh.split for task in tasks} == {split}

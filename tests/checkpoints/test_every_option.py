@@ -58,6 +58,8 @@ BITLESS: dict[str, list[str]] = {
     "--threads": ["--threads", "1"],
     "--quiet": ["--quiet"],
 }
+# Those of view factors: tests/commands/test_view_factors_command.py.
+VIEW_FACTORS = {"--groups", "--max-rays", "--rtol", "--sides"}
 # What changes the points: below, in test_written_files.py and in test_several_meshes.py.
 PLACES = {"--bounds", "--grid", "--height", "--hide", "--points", "mesh"}
 
@@ -123,7 +125,7 @@ def on_faces(folder: Path, kind: str, **given: Any) -> Any:
 def test_every_option_has_a_case() -> None:
     (choice,) = (action for action in make_parser()._actions if isinstance(action, argparse._SubParsersAction))
     actions = [action for action in choice.choices["study"]._actions if action.dest != "help"]
-    known = {name.partition(" ")[0] for name in (*FUNCTIONS, *BITLESS, *PLACES, "kind")}
+    known = {name.partition(" ")[0] for name in (*FUNCTIONS, *BITLESS, *PLACES, *VIEW_FACTORS, "kind")}
     assert {max(action.option_strings, key=len, default=action.dest) for action in actions} == known
 
 

@@ -22,6 +22,7 @@ from pathlib import Path
 import pytest
 import yaml
 from cases import cases
+from furnished import write_room
 
 from renderer import Hits, Octree, load_scene
 from renderer.cli.main import main, make_parser
@@ -242,6 +243,7 @@ def checkout(tmp_path, monkeypatch):
         (tmp_path / name).write_text(f"v 0 0 {z}\nv 1 0 {z}\nv 0 1 {z}\nf 1 2 3\n")
     for name in ("city.ply", "scan.ply"):
         save_ply(box((0.0, 0.0, 0.0), (4.0, 3.0, 2.0)), tmp_path / name)
+    write_room(tmp_path)
     (tmp_path / "suns.txt").write_text("1 0 1\n-1 0 1\n")
     (tmp_path / "suns.csv").write_text("azimuth,elevation,hours\n90,45,1\n270,45,2\n")
     save_ply(box((0.0, 0.0, 0.0), (4.0, 3.0, 2.0)), tmp_path / "my.ply")
@@ -265,7 +267,8 @@ def test_a_command_of_a_page_runs(page, line, checkout):
         environment = {**os.environ, "PYTHONPATH": str(ROOT)}
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=False)
         assert done.returncode == 0, done.stdout + done.stderr
-    written = {word for word in arguments if word.endswith((".png", ".npy")) or word in ("hours.ply", "shaded.ply")}
+    named = ("hours.ply", "shaded.ply", "factors.csv")
+    written = {word for word in arguments if word.endswith((".png", ".npy", ".npz")) or word in named}
     assert written <= {path.name for path in set(checkout.iterdir()) - before}
     if "--output" in arguments:
         page = checkout / arguments[arguments.index("--output") + 1] / "index.html"

@@ -72,10 +72,12 @@ import numpy as np
 from renderer.precompile import compile_ahead
 compile_ahead("queries")
 before = signatures()
+import warnings
 from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import icosphere
 from renderer.queryable import Queries
 from renderer.studies import ambient_occlusion, occlusion, scan, sky_view_factor, visible_faces
+from renderer.studies import view_factors, view_factors_from
 ball, rng = icosphere(3), np.random.default_rng(1)
 # In float64 and in float32, of which the kernels of trees have two kinds.
 meshes = [ball, Mesh(ball.vertices.astype(np.float32), ball.faces), Mesh(ball.vertices * 1e-60, ball.faces)]
@@ -109,6 +111,12 @@ for tree in trees:
         visible_faces(tree, tree.mesh.vertices[0])  # in the planes of some faces
         asked |= {"visible", "contains", "winding_number", "closest_point", "signed_distance"}
     tree.refit(tree.mesh.vertices * 1.5)
+    few, groups = {"max_rays": 512}, np.arange(len(tree.mesh.faces)) // 9
+    for sides, shares in (("front", None), ("both", None), ("both", groups % 2 / 2)):
+        with warnings.catch_warnings(action="ignore"):
+            view_factors(tree, groups, sides=sides, transmittance=shares, **few)
+            view_factors(tree, groups, sides=sides, transmittance=shares, form="rays", max_rays=8)
+            view_factors_from(tree, corners[:9], -corners[:9], groups, sides=sides, transmittance=shares, **few)
 public = {name for name, value in vars(Queries).items() if callable(value) and not name.startswith("_")}
 assert public == asked, public ^ asked
 print(len(before), *sorted(signatures() - before))

@@ -19,7 +19,7 @@ def under_a_sky(share):
     def factors(mesh):
         sky = share(mesh.triangles.mean(axis=1))
         n = len(sky)
-        return enclosures.factors(areas_of(mesh), np.zeros((n, n)), sky, 1.0 - sky)
+        return enclosures.factors(areas_of(mesh), np.zeros((n, n)), sky)
 
     return factors
 

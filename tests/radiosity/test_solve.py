@@ -25,12 +25,14 @@ def dense(factors, emission, reflectance, sky=0.0):
     n = len(factors.areas)
     emission, reflectance = (np.broadcast_to(given, (n, 3)) for given in (emission, reflectance))
     sky = np.broadcast_to(sky, 3)
-    matrix = factors.exchange.toarray() / factors.areas[:, None]
+    # What is not behind backs.
+    share = 1.0 - factors.backs
+    matrix = factors.exchange.toarray() / (factors.areas * share)[:, None]
     columns = []
     for channel in range(3):
         rho = reflectance[:, channel]
         system = np.eye(n) - rho[:, None] * matrix
-        columns.append(np.linalg.solve(system, emission[:, channel] + rho * factors.sky * sky[channel]))
+        columns.append(np.linalg.solve(system, emission[:, channel] + rho * factors.sky / share * sky[channel]))
     return np.stack(columns, axis=1)
 
 
@@ -126,11 +128,12 @@ def test_the_inverse_is_bounded_also_where_some_reflect_all():
         if seed % 4 < 2:
             rho[4:] = 1.0
         exchange = check_factors(factors)
-        inverse = np.linalg.inv(np.eye(12) - rho * factors.exchange.toarray() / factors.areas[:, None])
+        inverse = np.linalg.inv(np.eye(12) - rho * factors.exchange.toarray() / exchange.areas[:, None])
         exact = inverse.sum(axis=1).max()
         found = amplification_of(System(exchange, emission, rho))
         assert exact <= found * (1 + 1e-12)
-        assert seed % 4 >= 2 or found <= 2.1 * exact
+        # In an open one it is by the least loss of a row.
+        assert seed % 4 != 1 or found <= 2.1 * exact
 
 
 def test_iterations_do_not_grow_with_the_surfaces():
@@ -146,17 +149,15 @@ def test_iterations_do_not_grow_with_the_surfaces():
 def test_energy_is_balanced_up_to_the_residual(is_open):
     factors, emission, rho, sky = drawn(5, 40, is_open=is_open)
     found = radiosity(factors, emission, rho, sky=sky)
-    balance, areas = found.balance, factors.areas[:, None]
+    balance, areas = found.balance, (factors.areas * (1.0 - factors.backs))[:, None]
+    to_sky = (factors.areas * factors.sky)[:, None]
     entering = balance.emitted + balance.from_sky
     # A residual r leaves A r without a place; sums of 40 terms round.
     assert (np.abs(balance.error) <= areas.sum() * found.residual + 100 * 2.2e-16 * entering).all()
     np.testing.assert_allclose(balance.emitted, (areas * emission).sum(axis=0), rtol=1e-12)
     np.testing.assert_allclose(balance.absorbed, (areas * (1.0 - rho) * found.irradiance).sum(axis=0), rtol=1e-12)
-    np.testing.assert_allclose(balance.to_sky, (areas * factors.sky[:, None] * found.values).sum(axis=0), rtol=1e-12)
-    np.testing.assert_allclose(
-        balance.to_backs, (areas * factors.backs[:, None] * found.values).sum(axis=0), rtol=1e-12
-    )
-    np.testing.assert_allclose(balance.from_sky, (areas * factors.sky[:, None]).sum() * sky, rtol=1e-12)
+    np.testing.assert_allclose(balance.to_sky, (to_sky * found.values).sum(axis=0), rtol=1e-12)
+    np.testing.assert_allclose(balance.from_sky, to_sky.sum() * sky, rtol=1e-12)
     assert (balance.to_sky > 0).all() == is_open
 
 

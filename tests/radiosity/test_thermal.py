@@ -5,7 +5,10 @@ import numpy as np
 import pytest
 from cases import cases
 
+from renderer import Mesh, Octree
+from renderer.mesh.shapes import box
 from renderer.radiosity import net_heat
+from renderer.studies import view_factors
 
 pytestmark = pytest.mark.judges("radiosity.net_heat", "radiosity.Heat")
 
@@ -151,3 +154,17 @@ def test_adiabatic_rooms_apart_from_the_others_are_named():
     blocks = np.kron(np.eye(2), [[0.0, 1.0], [1.0, 0.0]])
     with pytest.raises(ValueError, match=r"got none for that of row 2$"):
         net_heat(enclosures.factors(np.ones(4), blocks), 0.5, [300.0, np.nan, np.nan, np.nan])
+
+
+def test_what_stands_on_a_floor_covers_it():
+    """A box without a bottom on the floor of a room: heat is that of the floor that is seen, and adds up to 0."""
+    room, thing = box((0, 0, 0), (4, 3, 2)), box((1, 1, 0), (2, 2, 1))
+    sides = thing.faces[thing.face_normals()[:, 2] > -0.5]
+    octree = Octree.from_mesh(Mesh.concatenate(Mesh(room.vertices, room.faces[:, ::-1]), Mesh(thing.vertices, sides)))
+    with pytest.warns(UserWarning, match="surface 4 most"):
+        found = view_factors(octree, np.repeat(np.arange(7), [2] * 6 + [len(sides)]), rtol=0.005)
+    assert found.backs[4] == pytest.approx(1 / 12, abs=0.005)
+    heat = net_heat(found, 0.8, [293, 293, 293, 293, 303, 291, 300])
+    assert abs(heat.net.sum()) < 1e-6 * np.abs(heat.net).max()
+    seen = found.areas[4] * (1.0 - found.backs[4])
+    assert heat.net[4] == pytest.approx(seen * heat.flux[4])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -37,7 +38,6 @@ def assembled(areas: Floats, pairs: KnownPairs, hits: RowHits) -> ViewFactors:
     # What no ray fills, less than a ray's share of a row: all entries change, exact ones too, by as much.
     found = balanced(found._replace(freedom=np.ones(len(freedom)), outside_freedom=np.ones(number)), areas)
     share = np.divide(found.outside, sky + backs, out=np.zeros(number), where=sky + backs > 0.0)
-    warn_of_backs(backs * share / areas)
     errors = type(upper)((np.sqrt(variance), upper.indices, upper.indptr), shape=upper.shape)
     exchange, errors = _symmetric(found.upper), _symmetric(errors)
     errors.data /= areas[rows_of(errors)]
@@ -83,11 +83,19 @@ def _symmetric(upper: csr_array) -> csr_array:
 
 
 def warn_of_backs(backs: Floats) -> None:
-    seen = np.flatnonzero(backs)
-    if len(seen):
-        worst = int(backs.argmax())
-        warnings.warn(
-            f"octree: {len(seen)} of {len(backs)} surfaces see backs of faces, surface {worst} most: "
-            f"{100.0 * backs[worst]:.3g} % of what it sends; turn these faces, or pass sides='both'",
-            stacklevel=4,
-        )
+    """Warn the caller of the function that calls this one of rows that see backs."""
+    message = backs_message(backs, range(len(backs)), "pass sides='both'")
+    if message:
+        warnings.warn(f"octree: {message}", stacklevel=3)
+
+
+def backs_message(backs: Floats, names: Sequence[object], remedy: str) -> str:
+    """What is said of rows that see backs, by their names; empty if there are none."""
+    seen = np.count_nonzero(backs)
+    if not seen:
+        return ""
+    worst = int(backs.argmax())
+    return (
+        f"{seen} of {len(backs)} surfaces see backs of faces, surface {names[worst]} most: "
+        f"{100.0 * backs[worst]:.3g} % of what it sends; turn these faces, or {remedy}"
+    )

@@ -15,13 +15,14 @@ from renderer.errors import expect
 from renderer.queryable import Queries
 from renderer.rayscene.scene import RayScene
 from renderer.studies.factors.aim import REPLICATES, senders_of
-from renderer.studies.factors.assemble import assembled
+from renderer.studies.factors.assemble import assembled, warn_of_backs
 from renderer.studies.factors.free import without_matrix
 from renderer.studies.factors.known import KnownPairs, known_of, pairs_worth
 from renderer.studies.factors.result import ViewFactors
-from renderer.studies.factors.rows import FIRST_RAYS, RowHits, Tracing, nothing_known, trace_rows
+from renderer.studies.factors.rows import FIRST_RAYS, RowHits, Tracing, nothing_known
 from renderer.studies.factors.sparse import scipy_sparse
 from renderer.studies.factors.surfaces import check_surfaces
+from renderer.studies.factors.work import AtOnce, Work
 from renderer.studies.share import octree_of
 from renderer.system.threads import checked_threads
 
@@ -118,22 +119,46 @@ def view_factors(
     >>> factors.sky.round(4)
     array([0.2   , 0.2   , 0.2   , 0.2   , 0.1998])
     """
-    scipy_sparse()
-    searched = octree_of(octree)
-    surfaces = check_surfaces(searched.mesh, groups, sides, transmittance)
     free = isinstance(form, str) and form == "rays"
     expect(free or (isinstance(form, str) and form == "matrix"), "form", "'matrix' or 'rays'", repr(form))
-    rtol, max_rays = check_effort(rtol, max_rays, REPLICATES if free else FIRST_RAYS)
+    tracing = checked_tracing(
+        octree, groups, sides=sides, transmittance=transmittance, rtol=rtol, max_rays=max_rays, threads=threads,
+        progress=progress, least=REPLICATES if free else FIRST_RAYS,
+    )  # fmt: skip
+    found = without_matrix(tracing) if free else computed(tracing, AtOnce())
+    warn_of_backs(found.backs)
+    return found
+
+
+def checked_tracing(
+    octree: Queries | RayScene,
+    groups: ArrayLike | None = None,
+    *,
+    sides: str = "front",
+    transmittance: ArrayLike | None = None,
+    rtol: float = 0.02,
+    max_rays: int = 1 << 16,
+    threads: int | None = None,
+    progress: bool = False,
+    least: int = FIRST_RAYS,
+) -> Tracing:
+    """The arguments of ``view_factors``, checked; ``least`` rays of a surface at least."""
+    searched = octree_of(octree)
+    surfaces = check_surfaces(searched.mesh, groups, sides, transmittance)
+    rtol, max_rays = check_effort(rtol, max_rays, least)
     workers = searched.threads if threads is None else checked_threads(threads)
     senders = senders_of(searched.mesh, surfaces)
     shown = flag_argument("progress", progress)
-    tracing = Tracing(searched._built, surfaces, senders, rtol, max_rays, workers, shown)
-    if free:
-        return without_matrix(tracing)
-    pairs = _known_pairs(tracing)
+    return Tracing(searched._built, surfaces, senders, rtol, max_rays, workers, shown)
+
+
+def computed(tracing: Tracing, work: Work) -> ViewFactors:
+    """The view factors. Each step of ``work`` depends on the arguments and on the steps before alone."""
+    scipy_sparse()
+    surfaces, pairs = tracing.surfaces, _known_pairs(tracing, work)
     left = surfaces.areas - pairs.sums(surfaces.number) > _WHOLE * surfaces.areas
     rows = np.flatnonzero(left)
-    hits = trace_rows(tracing, rows, pairs.known(surfaces.number))
+    hits = work.rows("rows", tracing, rows, pairs.known(surfaces.number))
     return assembled(surfaces.areas, pairs, _spread(hits, rows, surfaces.number))
 
 
@@ -145,14 +170,15 @@ def check_effort(rtol: float, max_rays: int, least: int = FIRST_RAYS) -> tuple[f
     return float(given), count_argument("max_rays", max_rays, least, _MOST_RAYS)
 
 
-def _known_pairs(tracing: Tracing) -> KnownPairs:
+def _known_pairs(tracing: Tracing, work: Work) -> KnownPairs:
     """The exact pairs: all of few faces; of many those whose rays would cost more."""
     number = tracing.surfaces.number
     worth = pairs_worth(tracing, None)
     if worth is None:
         few = tracing._replace(max_rays=FIRST_RAYS)
-        worth = pairs_worth(tracing, trace_rows(few, np.arange(number), nothing_known(number)))
-    return known_of(tracing, worth)
+        worth = pairs_worth(tracing, work.rows("survey", few, np.arange(number), nothing_known(number)))
+    assert worth is not None
+    return known_of(tracing, worth, work)
 
 
 def _spread(hits: RowHits, rows: Integers, number: int) -> RowHits:

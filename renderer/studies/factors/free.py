@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from renderer.errors import expect
 from renderer.jit.decorators import kernel
-from renderer.ordering.morton import order_along_curve
 from renderer.studies.factors.aim import REPLICATES
 from renderer.studies.factors.result import ViewFactors
-from renderer.studies.factors.rows import ROWS, Tracing, keys_of
+from renderer.studies.factors.rows import ROWS, Tracing, keys_of, order_of
 from renderer.studies.factors.tally import BACK, SKY
 from renderer.system.terminal import progress_bar
 from renderer.system.threads import for_chunks
@@ -84,7 +83,7 @@ def _targets_of(tracing: Tracing) -> NDArray[np.int32]:
     """What the rays of all surfaces end on, (n, max_rays)."""
     number, senders = tracing.surfaces.number, tracing.senders
     targets = np.empty((number, tracing.max_rays), np.int32)
-    order = order_along_curve(senders.corners[senders.first[:-1], :3])[0]
+    order = order_of(senders, np.arange(number))
     with progress_bar(number, "surface", tracing.progress) as update:
 
         def trace(begin: int, end: int) -> Iterator[None]:

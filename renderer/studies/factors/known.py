@@ -7,16 +7,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.studies.factors.pairs import exact_pairs
 from renderer.studies.factors.rows import Known, RowHits, Tracing
-from renderer.system.terminal import progress_bar
+from renderer.studies.factors.work import Work
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# So many rays take as long as one exact pair of faces.
-_PAIR = 150
-# Of so many pairs of faces, a second of work, all are tried.
+# So many rays take as long as one exact pair of faces: 9 us, beside a quarter of one.
+_PAIR = 40
+# Of so many pairs of faces, half a second of work, all are tried.
 _ALL = 50_000
 
 
@@ -37,7 +36,8 @@ class KnownPairs(NamedTuple):
     def sums(self, number: int) -> Floats:
         """The sum of each of the rows."""
         beside = np.where(self.rows == self.columns, 0.0, self.values)
-        return np.bincount(self.rows, self.values, number) + np.bincount(self.columns, beside, number)
+        ends = np.bincount(self.rows, self.values, number) + np.bincount(self.columns, beside, number)
+        return np.asarray(ends, np.float64)
 
     def known(self, number: int) -> Known:
         """The same as rows of targets that need no rays."""
@@ -71,7 +71,7 @@ def pairs_worth(tracing: Tracing, hits: RowHits | None) -> Worth | None:
     return Worth(low[worth], high[worth])
 
 
-def known_of(tracing: Tracing, worth: Worth) -> KnownPairs:
+def known_of(tracing: Tracing, worth: Worth, work: Work) -> KnownPairs:
     """The pairs among those worth it that are proven for all their faces, with their exchange."""
     surfaces = tracing.surfaces
     order = np.argsort(surfaces.of_face, kind="stable")
@@ -90,9 +90,8 @@ def known_of(tracing: Tracing, worth: Worth) -> KnownPairs:
     faces = np.stack([np.minimum(first, second), np.maximum(first, second)], axis=1)
     two_sided = bool(surfaces.both.all())
     sound = ((surfaces.transmittance == 0.0) & (surfaces.both == two_sided))[faces].all(axis=1)
-    with progress_bar(len(faces), "pair", tracing.progress) as update:
-        exchange, known = exact_pairs(tracing.built, faces, tracing.threads, update, both=two_sided)
+    exchange, known = work.pairs(tracing, faces)
     unknown = np.bincount(pair, ~(known & sound), len(sizes)) > 0
-    values = np.bincount(pair, exchange, len(sizes)) * np.where(own, 2.0, 1.0)
+    values: Floats = np.where(own, 2.0, 1.0) * np.bincount(pair, exchange, len(sizes))
     kept = ~unknown
     return KnownPairs(worth.rows[kept], worth.columns[kept], values[kept])

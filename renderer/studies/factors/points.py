@@ -15,10 +15,11 @@ from renderer.studies.factors.aim import senders_at
 from renderer.studies.factors.assemble import warn_of_backs
 from renderer.studies.factors.compute import check_effort
 from renderer.studies.factors.result import PointFactors
-from renderer.studies.factors.rows import Tracing, nothing_known, trace_rows
+from renderer.studies.factors.rows import Tracing, nothing_known
 from renderer.studies.factors.sparse import scipy_sparse
 from renderer.studies.factors.surfaces import check_surfaces
 from renderer.studies.factors.tally import BACK, SKY
+from renderer.studies.factors.work import AtOnce
 from renderer.studies.share import check_request
 
 
@@ -96,7 +97,7 @@ def view_factors_from(
     senders = senders_at(found, places_of(mesh, places.points, found), planes, mesh)
     count, number = len(places.points), surfaces.number
     tracing = Tracing(request.octree._built, surfaces, senders, *effort, request.threads, request.progress)
-    hits = trace_rows(tracing, np.arange(count), nothing_known(count))
+    hits = AtOnce().rows("points", tracing, np.arange(count), nothing_known(count))
     inner = hits.targets < number
     where = (hits.rows[inner], hits.targets[inner])
     matrix = sparse.csr_array((hits.counts[inner] / hits.rays[where[0]], where), shape=(count, number))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from scipy.sparse import csr_array
+    from scipy.sparse import csr_array as csr_array
 else:
     csr_array = Any
 
@@ -35,6 +36,8 @@ class ViewFactors:
         The standard error of each entry of `matrix`; an entry that is exact has none. None with ``form="rays"``.
     rays : ndarray of int64, shape (n,)
         The rays that left each surface.
+    names : tuple of str, optional
+        The name of each surface, which files have; None if they have none.
 
     See Also
     --------
@@ -56,6 +59,7 @@ class ViewFactors:
     backs: Floats
     errors: csr_array | None
     rays: NDArray[np.int64]
+    names: tuple[str, ...] | None = None
 
     @property
     def matrix(self) -> csr_array:
@@ -81,6 +85,81 @@ class ViewFactors:
         factors.data /= np.repeat(self.areas, np.diff(factors.indptr))
         return factors
 
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a file, which appears whole or not at all.
+
+        Parameters
+        ----------
+        path : str or path
+            ``.npz``: all of it, as `ViewFactors.load` reads it and ``numpy.load`` too: the arrays by their names,
+            without `names` if there are none, and of each matrix the three of ``scipy.sparse.csr_array``, such as
+            ``exchange_data``, ``exchange_indices`` and ``exchange_indptr``. Of `matrix` there is ``matrix_data``; the
+            other two are those of `exchange`.
+
+            ``.csv``: a row for each surface: its name, its area, a column with the view factor to each surface, the
+            sky, backs, and the largest standard error of the row.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written.
+        ValueError
+            If the name ends otherwise, with ``form="rays"``, or for a ``.csv`` of more than 16,380 surfaces, which is
+            what a spreadsheet has columns for.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from pathlib import Path
+        >>> from renderer import Octree
+        >>> from renderer.studies import view_factors
+        >>> factors = view_factors(Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     factors.save(f"{folder}/factors.csv")
+        ...     print(Path(folder, "factors.csv").read_text(), end="")
+        surface,area,0,sky,backs,error
+        0,0.5,0.0,1.0,0.0,0.0
+        """
+        from renderer.studies.factors.saved import save_factors  # which imports this module
+
+        save_factors(self, path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> ViewFactors:
+        """Read an ``.npz`` file that `save` wrote.
+
+        Parameters
+        ----------
+        path : str or path
+
+        Returns
+        -------
+        ViewFactors
+
+        Raises
+        ------
+        OSError
+            If the file cannot be read.
+        ValueError
+            If it is none of these files.
+        ImportError
+            If SciPy is not installed.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from renderer import Octree
+        >>> from renderer.studies import ViewFactors, view_factors
+        >>> factors = view_factors(Octree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     factors.save(f"{folder}/factors.npz")
+        ...     ViewFactors.load(f"{folder}/factors.npz").sky
+        array([1.])
+        """
+        from renderer.studies.factors.saved import load_factors
+
+        return load_factors(path)
+
 
 @dataclass(frozen=True, eq=False)
 class PointFactors:
@@ -101,6 +180,17 @@ class PointFactors:
     See Also
     --------
     view_factors_from
+
+    Examples
+    --------
+    A point below a roof sees the roof and the sky beside it.
+
+    >>> from renderer import Octree
+    >>> from renderer.studies import view_factors_from
+    >>> roof = Octree([[-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], [[0, 2, 1], [0, 3, 2]])
+    >>> factors = view_factors_from(roof, [[0, 0, 0]], [0, 0, 1], [0, 0], rtol=0.002)
+    >>> factors.matrix.toarray().round(2), factors.sky.round(2)
+    (array([[0.55]]), array([0.45]))
     """
 
     matrix: csr_array

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,6 @@ from renderer.results.hits import Hits
 from renderer.studies.factors.aim import WEYL, Senders, aim_rows, rays_from
 from renderer.studies.factors.surfaces import Surfaces
 from renderer.studies.factors.tally import tally_rows, write_keys
-from renderer.system.terminal import progress_bar
 from renderer.system.threads import for_chunks
 from renderer.trace.batch import CHUNK, Leaving, RayBatch, make_starts, offset_origins, reject
 from renderer.trace.closest import find_range
@@ -26,6 +25,8 @@ from renderer.trace.starts.record import HEAD, ROW
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+# Is called with the rows done, or pairs, since the last call.
+Update = Callable[[int], object] | None
 
 # The rays of a row at first: the least that tells a share of a hundredth from one of a fiftieth.
 FIRST_RAYS = 256
@@ -89,20 +90,21 @@ def nothing_known(rows: int) -> Known:
     return Known(np.zeros(rows + 1, np.int64), np.empty(0, np.int64))
 
 
-def trace_rows(tracing: Tracing, rows: Integers, known: Known) -> RowHits:
-    """Trace the rays of some rows; ``known`` has all rows."""
-    none = np.empty(0, np.int64)
-    parts = [(none, RowHits(np.zeros(1, np.int64), none, none, np.empty(0), none))]
-    with progress_bar(len(rows), "surface", tracing.progress) as update:
-        # Rows beside each other send rays that travel together.
-        senders = tracing.senders
-        order = order_along_curve(senders.corners[senders.first[rows], :3])[0]
+def trace_rows(tracing: Tracing, rows: Integers, known: Known, update: Update = None) -> RowHits:
+    """Trace the rays of some rows; ``known`` has all rows. What a row hits does not depend on the others."""
+    parts: list[tuple[Integers, RowHits]] = []
+    order = order_of(tracing.senders, rows)
 
-        def trace(begin: int, end: int) -> Iterator[None]:
-            yield from _trace_until(tracing, order[begin:end], rows, known, parts)
+    def trace(begin: int, end: int) -> Iterator[None]:
+        yield from _trace_until(tracing, order[begin:end], rows, known, parts)
 
-        for_chunks(trace, len(rows), ROWS, tracing.threads, update)
-    return _in_order(parts)
+    for_chunks(trace, len(rows), ROWS, tracing.threads, update)
+    return in_order(parts)
+
+
+def order_of(senders: Senders, rows: Integers) -> Integers:
+    """The places of rows along a curve: rows beside each other send rays that travel together."""
+    return order_along_curve(senders.corners[senders.first[rows], :3])[0]
 
 
 def _trace_until(
@@ -128,25 +130,16 @@ def _tally(keys: Integers, rows: Integers, known: Known, rtol: float, last: bool
     unfinished = np.empty(count, np.bool_)
     spans = [known.targets[known.first[row] : known.first[row + 1]] for row in rows]
     first = np.concatenate([[0], np.cumsum([len(span) for span in spans])])
-    written = tally_rows(
-        keys,
-        first,
-        np.concatenate(spans),
-        rtol,
-        last,
-        targets,
-        counts,
-        errors,
-        lengths,
-        unfinished,
-    )  # fmt: skip
+    written = tally_rows(keys, first, np.concatenate(spans), rtol, last, targets, counts, errors, lengths, unfinished)
     ends = np.concatenate([[0], np.cumsum(lengths[~unfinished])])
-    columns = (column[:written].copy() for column in (targets, counts, errors))
-    return RowHits(ends, *columns, np.full(len(ends) - 1, rays)), unfinished
+    targets, counts, errors = (column[:written].copy() for column in (targets, counts, errors))
+    return RowHits(ends, targets, counts, errors, np.full(len(ends) - 1, rays)), unfinished
 
 
-def _in_order(parts: list[tuple[Integers, RowHits]]) -> RowHits:
+def in_order(parts: list[tuple[Integers, RowHits]]) -> RowHits:
     """The hits of rows in the order of their places, from records of some rows each."""
+    none = np.empty(0, np.int64)
+    parts = [(none, RowHits(np.zeros(1, np.int64), none, none, np.empty(0), none)), *parts]
     order = np.argsort(np.concatenate([own for own, _ in parts]), kind="stable")
     begins = np.concatenate([part.first[:-1] for _, part in parts])
     sizes = np.array([len(part.targets) for _, part in parts], np.int64)
@@ -155,8 +148,8 @@ def _in_order(parts: list[tuple[Integers, RowHits]]) -> RowHits:
     begins, lengths = begins[order], lengths[order]
     first = np.concatenate([[0], np.cumsum(lengths)])
     entries = np.arange(first[-1]) + np.repeat(begins - first[:-1], lengths)
-    columns = (np.concatenate([part[k] for _, part in parts])[entries] for k in (1, 2, 3))
-    return RowHits(first, *columns, np.concatenate([part.rays for _, part in parts])[order])
+    targets, counts, errors = (np.concatenate([part[k] for _, part in parts])[entries] for k in (1, 2, 3))
+    return RowHits(first, targets, counts, errors, np.concatenate([part.rays for _, part in parts])[order])
 
 
 def keys_of(tracing: Tracing, rows: Integers, begin: int, count: int) -> Generator[None, None, Integers]:

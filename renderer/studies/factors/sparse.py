@@ -2,6 +2,8 @@
 
 from types import ModuleType
 
+from renderer.errors import extra_hint
+
 
 def scipy_sparse() -> ModuleType:
     """The module ``scipy.sparse``. Raises ``ImportError`` naming the extra that installs it."""
@@ -9,6 +11,6 @@ def scipy_sparse() -> ModuleType:
         import scipy.sparse
         import scipy.sparse.linalg
     except ImportError as error:
-        message = 'view factors need SciPy: pip install "octree-renderer[radiosity]"'
+        message = f"view factors need SciPy; {extra_hint('radiosity')}"
         raise ImportError(message, name=error.name) from None
     return scipy.sparse

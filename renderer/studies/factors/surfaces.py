@@ -11,6 +11,7 @@ from renderer.arguments.arrays import real_argument
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
+from renderer.studies.translucent import check_transmittance
 from renderer.trace.batch import whole_numbers
 
 Floats = NDArray[np.float64]
@@ -43,14 +44,14 @@ def check_surfaces(mesh: Mesh, groups: ArrayLike | None, sides: str, transmittan
     """The arguments of ``view_factors``, checked. Raises ``ValueError`` naming argument and row."""
     count = len(mesh.faces)
     expect(count > 0, "octree", "a mesh with faces", "none")
-    shares = check_transmittance(transmittance, count)
+    shares = np.zeros(count) if transmittance is None else check_transmittance("transmittance", transmittance, count)
     known = isinstance(sides, str) and sides in ("front", "both")
     expect(known, "sides", "'front' or 'both'", repr(sides))
     of_face = np.arange(count) if groups is None else _check_groups(groups, count)
     both = (shares > 0.0) | (sides == "both")
     # rule: area-that-sends
     weights = areas_of(mesh) * np.where(both, 2.0, 1.0) * (1.0 - shares)
-    areas = np.bincount(of_face, weights)
+    areas = np.asarray(np.bincount(of_face, weights), np.float64)
     empty = ~(areas > 0.0)
     if empty.any():
         row = int(empty.argmax())
@@ -58,20 +59,6 @@ def check_surfaces(mesh: Mesh, groups: ArrayLike | None, sides: str, transmittan
         expect(False, "groups", "surfaces with an area", f"none in surface {row}, of the faces {faces}")
     expect(bool(np.isfinite(areas).all()), "octree", "areas below the largest float64", "larger ones")
     return Surfaces(of_face, areas, weights, both, shares)
-
-
-def check_transmittance(transmittance: ArrayLike | None, count: int) -> Floats:
-    """The share of a ray that each face lets through, (F,), from 0 to 1; zeros for None."""
-    if transmittance is None:
-        return np.zeros(count)
-    given = real_argument("transmittance", transmittance)
-    expect(given.shape == (count,), "transmittance", f"shape ({count},), one a face", f"shape {given.shape}")
-    shares: Floats = np.array(given, np.float64)
-    bad = ~((shares >= 0.0) & (shares <= 1.0))
-    if bad.any():
-        row = int(bad.argmax())
-        expect(False, "transmittance", "numbers from 0 to 1", f"{shares[row]} in row {row}")
-    return shares
 
 
 def areas_of(mesh: Mesh) -> Floats:

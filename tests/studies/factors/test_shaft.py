@@ -74,6 +74,15 @@ def test_a_screen_in_the_way_leaves_nothing_known():
     # A face whose own plane cuts the hull, beside the upright edge of the hull at the origin: only across both edges.
     edge, out = np.array([[1, -1, 1], [-1, 1, 0], [-5, -5, 0.5]]), np.array([-1e-6, -1e-6, 0])
     screens |= {"past": (edge + out, True), "on": (edge, True), "through": (edge - out, False)}
+    # A large face, of which the hull has one corner in its midst: only across the face itself.
+    normal = np.array([1.0, -0.4, 0.7])
+    sides = np.array([[0.4, 1, 0], [0.7, 0, -1], [-1.1, -1, 1]]) * 5
+    tangent = np.array([1, 0, 1]) + sides
+    screens |= {
+        "before": (tangent + 1e-6 * normal, True),
+        "at": (tangent, True),
+        "in": (tangent - 1e-6 * normal, False),
+    }
     for name, (screen, clear) in screens.items():
         for seed in range(4):
             triangles = np.stack([FLOOR, CEILING, np.array(screen, float)])
