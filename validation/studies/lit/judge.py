@@ -25,6 +25,8 @@ Floats = NDArray[np.float64]
 _SIZE, _SQUARE = 48, 4
 # Paths a pixel: their standard error of a square is below 1 %.
 _PATHS, _QUICK_PATHS = 2048, 512
+# Of view factors: their errors are then smaller than those of meshing.
+_RTOL = 0.02
 # Mean relative error with these patches. Shadows are as blurred as patches are wide.
 _ERROR = 0.03
 # Of all light in the picture: blurring moves light, and makes none. At outlines of objects some of it is moved out of
@@ -94,7 +96,7 @@ def check_scene(name: str, quick: bool) -> dict[str, Any]:
 
 def shown(scene: Scene, edge: float) -> Floats:
     """Our picture with patches of that length."""
-    return render(lit_scene(scene, edge), resolution=_SIZE, samples=16).radiance.astype(np.float64)
+    return render(lit_scene(scene, edge, rtol=_RTOL), resolution=_SIZE, samples=16).radiance.astype(np.float64)
 
 
 def _without_lamps(scene: Scene) -> NDArray[np.bool_]:
