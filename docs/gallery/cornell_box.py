@@ -2,8 +2,8 @@
 Light between surfaces
 ======================
 
-The Cornell box by radiosity: its only light is the lamp's emission. The red and the green wall colour what stands beside
-them, and no picture after the first costs more than its rays.
+The Cornell box by radiosity: its only light is the lamp's emission. The red and the green wall colour what stands
+beside them, and no picture after the first costs more than its rays.
 """
 
 import os

@@ -16,11 +16,23 @@ from renderer import Mesh, Scene, load_mesh, load_scene, render, shapes
 from renderer.cli.main import main, make_parser
 from renderer.radiosity import lit_scene
 
-OPTIONS = (
-    "scene", "--up", "--output", "--edge", "--rtol", "--max-rays", "--crease", "--resolution", "--samples",
-    "--exposure", "--tone", "--threads", "--quiet",
-)  # fmt: skip
-pytestmark = pytest.mark.judges("octree-render radiosity", *(f"octree-render radiosity {name}" for name in OPTIONS))
+pytestmark = pytest.mark.judges(
+    "octree-render radiosity",
+    "octree-render radiosity scene",
+    "octree-render radiosity --up",
+    "octree-render radiosity --output",
+    "octree-render radiosity --edge",
+    "octree-render radiosity --rtol",
+    "octree-render radiosity --max-rays",
+    "octree-render radiosity --crease",
+    "octree-render radiosity --resolution",
+    "octree-render radiosity --samples",
+    "octree-render radiosity --exposure",
+    "octree-render radiosity --tone",
+    "octree-render radiosity --threads",
+    "octree-render radiosity --quiet",
+)
+OPTIONS = [name.rpartition(" ")[2] for name in pytestmark.args[1:]]
 
 ROOM = """
 background = [0.5, 0.4, 0.3]

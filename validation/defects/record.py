@@ -39,7 +39,7 @@ KEPT = {
     "RMS of mip maps beside many samples": "states the error of the filter, of which closed forms see the exact cases",
     "mean relative error": "bounds the error where a meshing error is so large that it could hide it",
     "relative error of all light": "tells light that is lost from light that is blurred",
-    "largest error of the furnace": "a closed form, to float32; pictures beside random paths see percents",
+    "largest error by radiosity": "a closed form, to float32; pictures beside random paths see percents",
     "distance of the slope of log RMSE from -1/2": _PATHS,
     "p-value of the largest z": _PATHS,
 }

@@ -72,7 +72,7 @@ def gates(record: dict[str, Any]) -> list[Gate]:
     off = record["furnace"]["error"]
     return [
         *found,
-        Gate("studies", "a furnace by radiosity", "largest error of the furnace", off, "at most", _FURNACE, _CONSTANT, _JUDGED),
+        Gate("studies", "a furnace", "largest error by radiosity", off, "at most", _FURNACE, _CONSTANT, _JUDGED),
     ]
 
 
