@@ -40,6 +40,10 @@ KEPT = {
     "mean relative error": "bounds the error where a meshing error is so large that it could hide it",
     "relative error of all light": "tells light that is lost from light that is blurred",
     "largest error by radiosity": "a closed form, to float32; pictures beside random paths see percents",
+    "error over what is allowed": "closed forms of view factors, the only truth that is no other program's",
+    "stated error over that requested": "holds what rtol promises: defects that miss it miss closed forms too",
+    "standard errors from Embree's rays": "judges rooms without a closed form",
+    "mean square of true over stated error": "tells errors that are stated too small from errors that are too large",
     "distance of the slope of log RMSE from -1/2": _PATHS,
     "p-value of the largest z": _PATHS,
 }

@@ -118,8 +118,8 @@ class TestDiscs:
 
     @cases("one, two, far, between, share", BETWEEN)
     def test_lines_through_three_discs_one_by_one(self, one, two, far, between, share):
-        """Points of the first and the third disc, by rings of equal area and the angle between them: the kernel, where the
-        line goes on to the second disc.
+        """Points of the first and the third disc, by rings of equal area and the angle between them: the kernel, where
+        the line goes on to the second disc.
         """
         p2, q2 = np.meshgrid(one**2 * midpoints(0, 1, 150), between**2 * midpoints(0, 1, 150), indexing="ij")
         cosine, p, q = np.cos(midpoints(0, np.pi, 300)), np.sqrt(p2)[..., None], np.sqrt(q2)[..., None]

@@ -75,8 +75,9 @@ class TestRooms:
 def test_closed_forms_hold_and_see_what_is_more_than_allowed(monkeypatch, name):
     row = forms.check(name, True)
     assert row["share_of_allowed"] <= 1.0 and row["share_of_asked"] <= 1.0
-    # What is exact may err by 1e-9 of the area; what is not, by eight errors, each at most a fiftieth of the largest.
-    gain = 1.0 + (1e-7 if row["stated"] == 0.0 else 0.2)
+    # What is exact may err by 1e-9 of the area; what is not, by eight errors, and what is round has two bounds.
+    exact = row["stated"] == 0.0 and all(entry.low == entry.high for entry in forms.FORMS[name]().entries)
+    gain = 1.0 + (1e-7 if exact else 0.5)
     wrong(forms, monkeypatch, lambda found: scaled(found, gain))
     assert forms.check(name, True)["share_of_allowed"] > 1.0
 
@@ -104,6 +105,7 @@ def test_embree_agrees_and_sees_a_thirtieth(monkeypatch, name):
 
 @cases("name", errors.FORMS)
 def test_errors_fall_and_are_stated(monkeypatch, name):
+    monkeypatch.setattr(errors, "_QUICK", errors._QUICK[:3])
     row = errors.check(name, True)
     assert row["slope"] <= errors.SLOPE and row["ratio"] <= errors.HONEST
     wrong(errors, monkeypatch, lambda found: replace(scaled(found, 1.05), errors=found.errors * 0.5))
@@ -130,6 +132,7 @@ def _across(found):
 
 BROKEN = {
     "rows of view factors": lambda found: replace(found, sky=found.sky + 1e-11),
+    "rows by rays alone": lambda found: replace(found, sky=found.sky + 1e-7),
     "reciprocal exchange": _unlike,
     "view factors are shares": lambda found: replace(found, sky=found.sky - 1.1),
     "planes and themselves": _self_seen,

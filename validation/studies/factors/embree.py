@@ -27,7 +27,7 @@ ERRORS = 5.0
 def check(name: str, quick: bool) -> dict[str, Any]:
     """A row: entries, the largest difference of a view factor, and the largest in standard errors of both."""
     room = ROOMS[name]()
-    found = view_factors(Octree.from_mesh(room.mesh), room.groups, rtol=_RTOL[quick], max_rays=_RAYS)
+    found: Any = view_factors(Octree.from_mesh(room.mesh), room.groups, rtol=_RTOL[quick], max_rays=_RAYS)
     ours = np.concatenate([found.matrix.toarray(), found.sky[:, None]], axis=1)
     rays = _QUICK if quick else _FULL
     theirs = counted(room, rays) / rays

@@ -7,13 +7,15 @@ from typing import Any
 from validation.gates import Gate
 from validation.job import Job, Task
 from validation.studies.factors import embree, errors, forms, laws, points
+from validation.studies.factors.rooms import ROOMS
 
-_FORM = "eight standard errors, as eight sequences state them; an exact entry: 1e-9 of the area"
-_ASKED = "rows have rays until each error is at most rtol of the largest entry"
+_FORM = "eight standard errors, which chance exceeds once in 11,000; an exact entry: 1e-9 of the area"
+_ASKED = "a row has rays until the root of the sum of its squared errors is at most rtol"
 _APART = "chance is beyond five standard errors once in two million"
-_SLOPE = "random rays give -1/2; the mean of some dozen errors moves the slope by 0.05 at most"
+_SLOPE = "random rays give -1/2; chance in the mean of some dozen errors moves that by less than 0.05"
 _HONEST = "a stated error is that of eight sequences: squares vary by a half, and their mean over entries by less"
 _LAW = "exact: it must hold for every answer"
+_WASTE = "errors stated twice as large as they are take four times the rays"
 _MATRIX = ("studies.view_factors",)
 _POINTS = ("studies.view_factors_from",)
 
@@ -29,7 +31,7 @@ def tasks(quick: bool) -> list[Task]:
         *(Task(f"view factors: {name}", partial(forms.check, name, quick)) for name in forms.FORMS),
         *(Task(f"view factors: {name}", partial(points.check, name, quick)) for name in points.CHECKS),
         *(Task(f"view factors: {name}", partial(laws.check, name)) for name in laws.CHECKS),
-        *(Task(f"view factors: {name} beside Embree", partial(embree.check, name, quick)) for name in embree.ROOMS),
+        *(Task(f"view factors: {name} beside Embree", partial(embree.check, name, quick)) for name in ROOMS),
         *(Task(f"view factors: errors of {name}", partial(errors.check, name, quick)) for name in errors.FORMS),
     ]
 
@@ -40,7 +42,7 @@ def record(found: Iterator[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
         "forms": [next(found) for _ in forms.FORMS],
         "points": [next(found) for _ in points.CHECKS],
         "laws": [next(found) for _ in laws.CHECKS],
-        "embree": [next(found) for _ in embree.ROOMS],
+        "embree": [next(found) for _ in ROOMS],
         "errors": [next(found) for _ in errors.FORMS],
     }
 
@@ -55,6 +57,9 @@ def gates(found: dict[str, list[dict[str, Any]]]) -> list[Gate]:
         *(_gate(row, "standard errors from Embree's rays", "apart", embree.ERRORS, _APART) for row in found["embree"]),
         *(_gate(row, "slope of the error", "slope", errors.SLOPE, _SLOPE) for row in found["errors"]),
         *(_gate(row, "mean square of true over stated error", "ratio", errors.HONEST, _HONEST)
+          for row in found["errors"]),
+        *(Gate("studies", row["subject"], "mean square of true over stated error", float(row["ratio"]), "at least",
+               errors.WASTE, _WASTE, _MATRIX)
           for row in found["errors"]),
         *(_gate(row, "wrong answers", "wrong", 0.0, _LAW, row["judged"]) for row in found["laws"]),
     ]  # fmt: skip

@@ -26,7 +26,8 @@ class Room(NamedTuple):
         """The area of each surface, one side of it."""
         corners = self.mesh.triangles
         across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        return np.bincount(self.groups, np.linalg.norm(across, axis=1) / 2.0)
+        areas: Floats = np.bincount(self.groups, np.linalg.norm(across, axis=1) / 2.0).astype(np.float64)
+        return areas
 
 
 class Plane(NamedTuple):

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.mesh.shapes import icosphere
@@ -44,6 +45,6 @@ def ball(radius: float, centre: tuple[float, float, float], level: int, outward:
     return Mesh(own.vertices * radius + centre, faces), Radii(radius * within, radius)
 
 
-def _ring(radius: float, height: float, sides: int) -> np.ndarray:
+def _ring(radius: float, height: float, sides: int) -> NDArray[np.float64]:
     angle = 2.0 * np.pi * np.arange(sides) / sides
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(sides, height)], axis=1)

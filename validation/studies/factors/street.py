@@ -7,16 +7,17 @@ import numpy as np
 from renderer.mesh.mesh import Mesh
 from validation.meshes import squares
 from validation.oracle.view_factors.strings import Point, Segment, exchange
-from validation.studies.bodies import FAR
 from validation.studies.factors.rooms import Ints, Room
 
 WIDTH, LEFT, RIGHT = 4.0, 3.0, 2.5
 # The block's sides and its height.
 BLOCK = (1.5, 2.25, 1.25)
 TIPS = (Point(BLOCK[0], BLOCK[2]), Point(BLOCK[1], BLOCK[2]))
-# What leaves a piece of street through its two ends is at most the ends' area.
-ENDS = 2.0 * WIDTH * max(LEFT, RIGHT)
-LENGTH = 2.0 * FAR
+# A piece of the street from -REACH to REACH stands for it. Two of its lines at the distance d in the section exchange
+# less than lines without end by the mean difference of their y, 2 d / pi, over the length.
+REACH = 1e4
+LENGTH = 2.0 * REACH
+MISSING = 2.0 / np.pi * float(np.hypot(WIDTH, max(LEFT, RIGHT))) / LENGTH
 
 
 def strips() -> list[tuple[str, Segment]]:
@@ -49,7 +50,9 @@ def room() -> Room:
     plates = []
     for _, (start, end) in strips():
         # y cross (end - start) is to the right of the way in the section.
-        plates.append([[start.x, -FAR, start.z], [start.x, FAR, start.z], [end.x, FAR, end.z], [end.x, -FAR, end.z]])
+        plates.append(
+            [[start.x, -REACH, start.z], [start.x, REACH, start.z], [end.x, REACH, end.z], [end.x, -REACH, end.z]]
+        )
     mesh: Mesh = squares(np.array(plates))
     groups: Ints = np.repeat(np.arange(len(plates)), 2).astype(np.int64)
     return Room(mesh, groups)
