@@ -15,7 +15,7 @@ OPPOSITE = 0.19982489569838746
 
 def above(mesh: Mesh, height: float) -> Mesh:
     """The mesh that far above, facing down."""
-    return Mesh([*mesh.vertices, 0, height, 0], mesh.faces[:, ::-1])
+    return Mesh(mesh.vertices + np.array([0.0, height, 0.0]), mesh.faces[:, ::-1])
 
 
 def light_on_ground(*more: Mesh) -> NDArray[np.float64]:
