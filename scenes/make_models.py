@@ -41,6 +41,7 @@ def models() -> dict[str, Mesh]:
         "sphere": in_float32(icosphere(5)),
         "stairs": stairs(),
         "block": box((0, 0, 0), (1, 1, 1)),
+        **{name: in_float32(mesh) for name, mesh in cornell_box().items()},
     }
 
 
@@ -169,6 +170,48 @@ def stairs(steps: int = 5, rise: float = 0.5, width: float = 4.0) -> Mesh:
     fan = np.stack([np.zeros(count - 2, int), edge[2:], edge[1:-1]], axis=1)
     faces = np.concatenate([rim, fan, count + fan[:, ::-1]])
     return Mesh(np.array(vertices), faces.astype(np.int32), name="stairs")
+
+
+# --- Cornell box: https://www.graphics.cornell.edu/online/box/data.html, in millimetres ----------------------
+
+# Corners of quadrilaterals, counter-clockwise seen from where they are lit.
+CORNELL_FLOOR = [(552.8, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 559.2), (549.6, 0.0, 559.2)]
+CORNELL_CEILING = [(556.0, 548.8, 0.0), (556.0, 548.8, 559.2), (0.0, 548.8, 559.2), (0.0, 548.8, 0.0)]
+CORNELL_BACK = [(549.6, 0.0, 559.2), (0.0, 0.0, 559.2), (0.0, 548.8, 559.2), (556.0, 548.8, 559.2)]
+CORNELL_RIGHT = [(0.0, 0.0, 559.2), (0.0, 0.0, 0.0), (0.0, 548.8, 0.0), (0.0, 548.8, 559.2)]
+CORNELL_LEFT = [(552.8, 0.0, 0.0), (549.6, 0.0, 559.2), (556.0, 548.8, 559.2), (556.0, 548.8, 0.0)]
+CORNELL_LAMP = [(343.0, 548.8, 227.0), (343.0, 548.8, 332.0), (213.0, 548.8, 332.0), (213.0, 548.8, 227.0)]
+# The upper faces of the blocks.
+CORNELL_SHORT = [(130.0, 165.0, 65.0), (82.0, 165.0, 225.0), (240.0, 165.0, 272.0), (290.0, 165.0, 114.0)]
+CORNELL_TALL = [(423.0, 330.0, 247.0), (265.0, 330.0, 296.0), (314.0, 330.0, 456.0), (472.0, 330.0, 406.0)]
+
+
+def cornell_box() -> dict[str, Mesh]:
+    """The Cornell box by its colours; the lamp fills a hole of the ceiling."""
+    ring = [
+        [CORNELL_CEILING[k], CORNELL_CEILING[(k + 1) % 4], CORNELL_LAMP[(k + 1) % 4], CORNELL_LAMP[k]] for k in range(4)
+    ]
+    blocks = [quad for upper in (CORNELL_SHORT, CORNELL_TALL) for quad in [upper, *block_sides(upper)]]
+    return {
+        "cornell_white": quads([CORNELL_FLOOR, CORNELL_BACK, *ring, *blocks], "cornell_white"),
+        "cornell_red": quads([CORNELL_LEFT], "cornell_red"),
+        "cornell_green": quads([CORNELL_RIGHT], "cornell_green"),
+        "cornell_lamp": quads([CORNELL_LAMP], "cornell_lamp"),
+    }
+
+
+def block_sides(upper: list[tuple[float, float, float]]) -> list[list[tuple[float, float, float]]]:
+    """The upright sides of a block that stands on the floor."""
+    foot = [(x, 0.0, z) for x, _, z in upper]
+    return [[foot[k], foot[(k + 1) % 4], upper[(k + 1) % 4], upper[k]] for k in range(4)]
+
+
+def quads(corners: ArrayLike, name: str) -> Mesh:
+    """Quadrilaterals, each as two faces; corners at one place are one vertex."""
+    vertices, corner = np.unique(np.reshape(corners, (-1, 3)), axis=0, return_inverse=True)
+    first, second, third, fourth = corner.reshape(-1, 4).T
+    faces = np.stack([np.stack([first, second, third], 1), np.stack([first, third, fourth], 1)], 1).reshape(-1, 3)
+    return Mesh(vertices, faces.astype(np.int32), name=name)
 
 
 # --- surfaces from curves -----------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from renderer import __version__
 from renderer.cli.compiling import add_compile, choose_processor
 from renderer.cli.info import add_info
+from renderer.cli.radiosity import add_radiosity
 from renderer.cli.render import add_render
 from renderer.cli.study import add_study
 from renderer.cli.view import add_view
@@ -92,7 +93,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="octree-render", description="Octree ray tracer for triangle meshes.")
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=True, metavar="command")
-    for add in (add_render, add_info, add_view, add_study, add_compile):
+    for add in (add_render, add_info, add_view, add_study, add_radiosity, add_compile):
         add(commands)
     return parser
 

@@ -11,7 +11,7 @@ from typing import Any, get_args
 
 from renderer.arguments.split import SPLIT, Split
 from renderer.cli.cluster import add_cluster, render_on_cluster
-from renderer.cli.scene import SPLIT_RULE, add_scene, say_up, write_scene_of
+from renderer.cli.scene import SPLIT_RULE, add_scene, files_read, say_up, write_scene_of
 from renderer.cli.turntable import add_frames, render_turntable
 from renderer.errors import expect
 from renderer.system.terminal import say
@@ -188,15 +188,11 @@ def _summary(image: Any, options: argparse.Namespace) -> str:
 
 def _check_output_is_no_input(options: argparse.Namespace, files: list[Path], scene: Any) -> None:
     """Refuse to write the picture over one of its inputs, also through links."""
-    from renderer.materials.base import appearance_of
     from renderer.system.files import are_apart
 
-    read = [*files, *(thing.mesh for thing in scene.objects if isinstance(thing.mesh, Path))]
-    looks = [appearance_of(material) for material in scene.materials.values()]
-    images = [texture.image.source for look in looks for texture in look.textures.values()]
-    read += [image for image in images if isinstance(image, Path)]
     written = [options.write_scene] if options.write_scene else []
-    apart, output = are_apart([options.output], [*read, *written]), os.path.realpath(options.output)
+    read = [*files_read(files, scene), *written]
+    apart, output = are_apart([options.output], read), os.path.realpath(options.output)
     expect(apart, "--output", "another file than the scene's own", f"{output} by a link")
 
 

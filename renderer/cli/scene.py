@@ -5,6 +5,7 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from renderer.errors import expect
 
@@ -26,6 +27,16 @@ def add_scene(command: argparse.ArgumentParser, *, shown: bool = True, several: 
     if shown:
         command.add_argument("--up", choices=("x", "y", "z"), help=_UP)
         command.add_argument("--write-scene", type=Path, metavar="FILE", help=_WRITE_SCENE)
+
+
+def files_read(files: Sequence[Path], scene: Any) -> list[Path]:
+    """The files that a scene of ``files`` is read from: those, and its meshes and images."""
+    from renderer.materials.base import appearance_of
+
+    read = [*files, *(thing.mesh for thing in scene.objects if isinstance(thing.mesh, Path))]
+    looks = [appearance_of(material) for material in scene.materials.values()]
+    images = [texture.image.source for look in looks for texture in look.textures.values()]
+    return read + [image for image in images if isinstance(image, Path)]
 
 
 def say_up(scenes: Sequence[Path], up: str | None) -> None:

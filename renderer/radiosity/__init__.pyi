@@ -1,6 +1,8 @@
 from .adapt import Adapted as Adapted
 from .adapt import adaptive as adaptive
 from .colors import vertex_colors as vertex_colors
+from .files import save_lit as save_lit
+from .lit import lit_scene as lit_scene
 from .patch import Patches as Patches
 from .patch import patches as patches
 from .patch import refined as refined

@@ -14,6 +14,7 @@ from renderer.materials.base import appearance_of
 from renderer.materials.columns import DIFFUSE, MATERIAL_COLUMNS, REFLECTANCE, SHININESS, SPECULAR, TRANSMITTANCE
 from renderer.materials.registry import Material
 from renderer.mesh.mesh import face_normals
+from renderer.picture.image import srgb
 from renderer.picture.prepare import PreparedScene
 from renderer.scene.hide import is_side
 from renderer.scene.light import DirectionalLight, Light
@@ -79,16 +80,21 @@ class Payload(NamedTuple):
 
 def mesh_payload(prepared: PreparedScene) -> Payload:
     """The answer to GET /mesh, little-endian: uint32 MAGIC and F, then for each of F faces the corners as 9 float32,
-    then for each their shading normals as 9 float32, then the materials as F uint16, filled up to four bytes.
+    then for each their shading normals as 9 float32, then the materials as F uint16, filled up to four bytes. If a
+    material uses colours of vertices, then those of corners in 8-bit sRGB, 9 bytes for each face, white of others.
 
     Raises ``ValueError`` where there are more materials than a uint16 counts.
     """
     arrays, count = prepared.arrays, len(prepared.arrays.faces)
     expect(len(arrays.materials) <= _MAX_MATERIALS, "materials", f"at most {_MAX_MATERIALS}", len(arrays.materials))
     head = struct.pack("<2I", MAGIC, count)
+    starts, filling = range(0, count, _FACES), count % 2 * 2
     parts = (_corners, _normals, _materials)
-    chunks = (part(arrays, slice(i, i + _FACES)).tobytes() for part in parts for i in range(0, count, _FACES))
-    return Payload(8 + 74 * count + count % 2 * 2, chain([head], chunks, [bytes(count % 2 * 2)]))
+    chunks = (part(arrays, slice(i, i + _FACES)).tobytes() for part in parts for i in starts)
+    tinted = count > 0 and bool((arrays.tints != 1.0).any())
+    tints = (_tints(arrays, slice(i, i + _FACES)).tobytes() for i in (starts if tinted else ()))
+    size = 8 + 74 * count + filling + 9 * count * tinted
+    return Payload(size, chain([head], chunks, [bytes(filling)], tints))
 
 
 def boxes_payload(prepared: PreparedScene, level: int) -> Payload:
@@ -115,18 +121,24 @@ def _normals(arrays: SceneArrays, some: slice) -> NDArray[np.float32]:
     return normals.astype("<f4")
 
 
+def _tints(arrays: SceneArrays, some: slice) -> NDArray[np.uint8]:
+    return srgb(arrays.tints[arrays.faces[some]])
+
+
 def _materials(arrays: SceneArrays, some: slice) -> NDArray[np.uint16]:
     return (arrays.material[some] // MATERIAL_COLUMNS).astype("<u2")
 
 
 def _material(name: str, material: Material) -> dict[str, Any]:
-    row = appearance_of(material).row().tolist()
+    look = appearance_of(material)
+    row = look.row().tolist()
     colors = {"diffuse": DIFFUSE, "specular": SPECULAR, "reflectance": REFLECTANCE, "transmittance": TRANSMITTANCE}
     return {
         "name": name,
         "type": material.type,
         **{color: row[column : column + 3] for color, column in colors.items()},
         "shininess": row[SHININESS],
+        "emission": look.emission,
         "fields": material.model_dump(exclude_none=True, exclude=set(UNSEEN)),
     }
 

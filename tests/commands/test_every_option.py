@@ -39,7 +39,8 @@ PICTURES: dict[str, tuple[str, Any]] = {
 }
 # Those that change no bit.
 BITLESS = {"--accelerator", "--split", "--threads"}
-# The options that other tests give alone; those of ``study`` are in tests/checkpoints/test_every_option.py.
+# The options that other tests give alone. Those of ``study`` are in tests/checkpoints/test_every_option.py, those of
+# ``radiosity`` in test_radiosity_command.py.
 HERE = {
     "render": {*PICTURES, "scene", "--output", "--write-scene", "--quiet", "--cluster", "--window"},
     "info": {"scene", "--split"},
@@ -115,7 +116,7 @@ def rendered(scene: Path, output: Path, *words: object) -> None:
 
 
 def test_every_option_has_a_case() -> None:
-    assert commands().keys() - {"study"} == HERE.keys()
+    assert commands().keys() - {"study", "radiosity"} == HERE.keys()
     for command, here in HERE.items():
         assert options_of(command) == here | ELSEWHERE.get(command, set()), command
 

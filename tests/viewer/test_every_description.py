@@ -15,7 +15,10 @@ from renderer.viewer.shown import UNSEEN, open_file
 # Scenes with a camera of the page.
 SHOWN = [v for v in VARIATIONS if v.table["camera"]["type"] in ("perspective", "orthographic")]
 # What the server alone goes by.
-UNTOLD = ("filter", "min_weight", "max_rays", "glass_shadows", "terminator", *UNSEEN)
+UNTOLD = (
+    *("filter", "min_weight", "max_rays", "glass_shadows", "terminator"),
+    *(name for name in UNSEEN if name not in ("emission", "emission_map", "vertex_colors")),
+)
 
 
 def fetched(folder: Path, table: Any) -> tuple[str, bytes]:

@@ -32,6 +32,7 @@ from validation.stability import sweeps
 from validation.stability.section import CASES, check_case
 from validation.studies import section as study_section
 from validation.studies.factors import judge
+from validation.studies.lit import judge as lit_judge
 from validation.thresholds import Thresholds
 
 SEED = 2029
@@ -147,6 +148,11 @@ def factors(job: Job) -> list[Gate]:
     return judge.run(job)
 
 
+def lit(job: Job) -> list[Gate]:
+    """Pictures by radiosity beside random paths, and a furnace."""
+    return lit_judge.run(job)
+
+
 # A defect in the picture's modules cannot change a hit, and a defect in hits needs no picture to be caught.
 GROUPS: dict[str, tuple[Callable[[Job], Iterable[Gate]], ...]] = {
     "hits": (
@@ -163,5 +169,6 @@ GROUPS: dict[str, tuple[Callable[[Job], Iterable[Gate]], ...]] = {
     "scenes": (promised(promises.SCENES), scenes),
     "studies": (studies,),
     "factors": (factors,),
+    "lit": (lit,),
     "pictures": (promised(promises.PICTURES), pictures, unseen, extreme(33, 45), extreme(47, 48)),
 }

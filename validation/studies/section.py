@@ -9,6 +9,7 @@ from validation.gates import Gate
 from validation.job import Job, Task
 from validation.studies import bits, bodies, corners, forms, holds, picture
 from validation.studies.factors import judge as factors
+from validation.studies.lit import judge as lit
 
 # Points and directions of each mesh whose bits are judged. All faces of most meshes: only points that lie as dense as
 # faces are traced together.
@@ -26,19 +27,19 @@ PICTURE = "studies-town.png"
 
 def steps(job: Job) -> int:
     """Number of calls of ``job.step``: one for each closed form, mesh and check, one for the slope, one to draw."""
-    return len(_tasks(job)) + len(factors.tasks(job.quick))
+    return len(_tasks(job)) + len(factors.tasks(job.quick)) + len(lit.tasks(job.quick))
 
 
 def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
     """Ask all questions and draw a picture; returns a record for JSON and the gates."""
-    found = iter(job.each([*_tasks(job), *factors.tasks(job.quick)]))
+    found = iter(job.each([*_tasks(job), *factors.tasks(job.quick), *lit.tasks(job.quick)]))
     record, gates = _judged(found)
-    exchanged = factors.record(found)
-    return record | {"factors": exchanged}, [*gates, *factors.gates(exchanged)]
+    exchanged, lighted = factors.record(found), lit.record(found)
+    return record | {"factors": exchanged, "lit": lighted}, [*gates, *factors.gates(exchanged), *lit.gates(lighted)]
 
 
 def without_factors(job: Job) -> list[Gate]:
-    """The gates of all checks but those of view factors."""
+    """The gates of all checks but those of view factors and radiosity."""
     return _judged(iter(job.each(_tasks(job))))[1]
 
 

@@ -105,8 +105,9 @@ export class Edits {
 
   // The scene with all this, as WebGL draws it.
   get dressed() {
-    const materials = this.named.map(([name, fields]) => ({ name, diffuse: BLACK, specular: BLACK,
-      reflectance: BLACK, transmittance: BLACK, shininess: 0, ...fields, fields }));
+    const materials = this.named.map(([name, fields], i) => ({ name, diffuse: BLACK, specular: BLACK,
+      reflectance: BLACK, transmittance: BLACK, shininess: 0, ...fields, fields,
+      emission: fields.type === "phong" ? this.scene.materials[i].emission : BLACK }));
     const lights = this.now.lights.map((fields) => ({ ...fields, color: fields.irradiance ?? fields.intensity }));
     return { ...this.scene, ...this.around.dressed, materials, lights: [...lights, ...this.around.skylights] };
   }

@@ -3,8 +3,8 @@ import { program } from "./program.js";
 
 const MAGIC = 0x4853454d;
 export const MAX_LIGHTS = 8;
-// Texels a material: diffuse and shininess, specular and kind, reflectance, transmittance.
-const TEXELS = 4;
+// Texels a material: diffuse and shininess, specular and kind, reflectance, transmittance, emission.
+const TEXELS = 5;
 const KINDS = { phong: 0, mirror: 1, dielectric: 2 };
 
 // Attributes of a corner. What belongs to a face, WebGL takes from the face's last corner.
@@ -12,6 +12,8 @@ const [POSITION, NORMAL, MATERIAL, COLOR] = [0, 1, 2, 3];
 const LAST = 2;
 // The positions of the two corners before a corner: of the last one, all that its face's normal takes.
 const [BEFORE, FIRST] = [4, 5];
+// The colour of a corner, in scenes that have any.
+const TINT = 6;
 // Bytes of a position.
 const POINT = 12;
 
@@ -25,7 +27,7 @@ export const LIGHTED = [LIT, FLAT, WIREFRAME];
 
 // Each shading of what is opaque and of glass is a program of its own, so that none moves values it does not look at:
 // software GL, and whoever has only that, spends its time on the values of corners.
-const source = (shading, glass, text) => `#version 300 es
+const source = (shading, glass, tinted, text) => `#version 300 es
 #define LIT ${LIT}
 #define FACES ${FACES}
 #define FLAT ${FLAT}
@@ -33,6 +35,7 @@ const source = (shading, glass, text) => `#version 300 es
 #define LIGHTED ${Number(LIGHTED.includes(shading))}
 #define SHADING ${shading}
 #define GLASS ${Number(glass)}
+#define TINTED ${Number(tinted)}
 precision highp float;
 precision highp int;
 ${text}`;
@@ -55,6 +58,10 @@ out vec3 corner;
 #if LIGHTED
 layout(location = ${MATERIAL}) in uint material_of_face;
 flat out uint material;
+#if TINTED
+layout(location = ${TINT}) in vec3 encoded_tint; // sRGB
+out vec3 tint;
+#endif
 #elif SHADING == FACES
 layout(location = ${COLOR}) in vec3 color_of_face;
 flat out vec3 face_color;
@@ -72,6 +79,9 @@ void main() {
 #endif
 #if LIGHTED
   material = material_of_face;
+#if TINTED
+  tint = mix(encoded_tint / 12.92, pow((encoded_tint + 0.055) / 1.055, vec3(2.4)), step(0.04045, encoded_tint));
+#endif
 #elif SHADING == FACES
   face_color = color_of_face;
 #endif
@@ -106,6 +116,11 @@ float edge() {
 flat in vec3 face_color;
 #elif LIGHTED
 flat in uint material;
+#if TINTED
+in vec3 tint;
+#else
+const vec3 tint = vec3(1.0);
+#endif
 uniform sampler2D materials;
 uniform vec3 ambient;
 uniform vec3 background;
@@ -122,7 +137,7 @@ vec3 srgb(vec3 linear) {
 vec3 lit(vec3 n, vec3 v) {
   int row = int(material);
   vec4 diffuse = texelFetch(materials, ivec2(0, row), 0), specular = texelFetch(materials, ivec2(1, row), 0);
-  vec3 kd = diffuse.rgb, ks = specular.rgb, sum = ambient * kd;
+  vec3 kd = diffuse.rgb * tint, ks = specular.rgb, sum = ambient * kd;
   float shininess = diffuse.w;
   if (specular.w != 0.0) {
     vec3 reflectance = texelFetch(materials, ivec2(2, row), 0).rgb;
@@ -132,6 +147,7 @@ vec3 lit(vec3 n, vec3 v) {
     ks = vec3(0.5);
     shininess = 90.0;
   }
+  sum += texelFetch(materials, ivec2(4, row), 0).rgb * tint;
   for (int i = 0; i < light_count; i++) {
     vec3 l = light_places[i].xyz - point * light_places[i].w;
     vec3 arriving = light_colors[i] / mix(1.0, dot(l, l), light_places[i].w);
@@ -180,14 +196,14 @@ export class Model {
     this.gl = gl;
     this.programs = {}; // each made when it is first needed
     this.vertices = gl.createVertexArray();
-    this.buffers = [POSITION, NORMAL, MATERIAL, COLOR].map(() => gl.createBuffer());
+    this.buffers = Object.fromEntries([POSITION, NORMAL, MATERIAL, COLOR, TINT].map((location) => [location, gl.createBuffer()]));
     this.materials = gl.createTexture();
     this.clear();
   }
 
   // Draw nothing until `load`.
   clear() {
-    Object.assign(this, { faces: 0, loaded: false, coloured: false, glass: null, materialOf: null, runs: { opaque: [], glass: [] } });
+    Object.assign(this, { faces: 0, loaded: false, coloured: false, tinted: false, glass: null, materialOf: null, runs: { opaque: [], glass: [] } });
   }
 
   // Take the triangles of the server's /mesh and the materials of its /scene.
@@ -209,9 +225,22 @@ export class Model {
     gl.vertexAttribIPointer(MATERIAL, 1, gl.UNSIGNED_SHORT, 0, 0);
     this.fill(COLOR, this.colors, gl.DYNAMIC_DRAW);
     gl.vertexAttribPointer(COLOR, 3, gl.UNSIGNED_BYTE, true, 4, 0);
+    this.loadTints(buffer, 8 + 74 * faces + (faces % 2) * 2);
     this.materialOf = materials;
     this.loaded = true;
     this.dress(scene.materials);
+  }
+
+  // The colours of corners are behind all else, if there are any.
+  loadTints(buffer, first) {
+    const { gl } = this;
+    this.tinted = buffer.byteLength > first;
+    if (!this.tinted) {
+      gl.disableVertexAttribArray(TINT);
+      return;
+    }
+    this.fill(TINT, new Uint8Array(buffer, first, 9 * this.faces), gl.STATIC_DRAW);
+    gl.vertexAttribPointer(TINT, 3, gl.UNSIGNED_BYTE, true, 0, 0);
   }
 
   // Take materials, as many as before.
@@ -282,8 +311,9 @@ export class Model {
   drawRuns(runs, shading, glass, clip, { eye, scene, veil, gain }) {
     if (!runs.length) return;
     const { gl } = this;
-    this.programs[[shading, glass]] ??= program(gl, source(shading, glass, VERTEX), source(shading, glass, FRAGMENT));
-    const { linked, uniforms } = this.programs[[shading, glass]];
+    const kind = [shading, glass, this.tinted];
+    this.programs[kind] ??= program(gl, source(...kind, VERTEX), source(...kind, FRAGMENT));
+    const { linked, uniforms } = this.programs[kind];
     gl.useProgram(linked);
     gl.uniformMatrix4fv(uniforms.clip, false, clip);
     gl.uniform4fv(uniforms.veil, veil);
@@ -325,4 +355,5 @@ const texels = (m) => [
   ...m.specular, KINDS[m.type],
   ...m.reflectance, 0,
   ...m.transmittance, 0,
+  ...m.emission, 0,
 ];

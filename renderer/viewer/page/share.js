@@ -6,7 +6,7 @@ import { drawing } from "./layers.js";
 import { NO_BOXES, NO_RAYS } from "./overlay.js";
 import { count } from "./readings.js";
 
-// The most faces of a model in a file: 74 bytes each are 20 MB in base64, which mail and browsers take.
+// The most faces of a model in a file: 74 bytes each are 20 MB in base64, 22 with colours, which mail and browsers take.
 const MOST_FACES = 200000;
 // The module that the file begins with; those that it imports come along. In the file they have this name.
 const FIRST = "standalone.js";

@@ -28,6 +28,7 @@ def run(tmp_path_factory):
 def test_all_gates_pass_and_the_record_draws_a_figure(run):
     record, gates, folder = run
     own = len(record["forms"]) + 2 + 5 + 2 * len(corners.CHECKS) + len(holds.CHECKS)
+    own += 3 * len(record["lit"]["scenes"]) + 1
     rows = {name: len(part) for name, part in record["factors"].items()}
     assert len(gates) - own == 2 * rows["forms"] + rows["points"] + rows["laws"] + rows["embree"] + 3 * rows["errors"]
     assert all(gate.passed for gate in gates)

@@ -7,7 +7,7 @@ from typing import Literal
 from validation.defects.changes import Change, Wrapped
 from validation.defects.inject import PACKAGE
 
-Group = Literal["hits", "queries", "scenes", "studies", "factors", "pictures"]
+Group = Literal["hits", "queries", "scenes", "studies", "factors", "lit", "pictures"]
 
 
 @dataclass(frozen=True)

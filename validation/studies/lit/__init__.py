@@ -1,0 +1,1 @@
+"""Pictures by radiosity against random paths."""
