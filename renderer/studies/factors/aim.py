@@ -1,8 +1,8 @@
 """Where rays start on a surface, and where they go: points uniform by area, directions by the cosine law.
 
-All surfaces send the same rays, each in its own frame, so the rays of faces beside each other travel together, and
-errors over a wall are smooth. The rays follow a Kronecker sequence in four dimensions, two for the point and two for
-the direction, eight times with shifts of their own: what these eight find differs as much as each errs.
+The rays follow a Kronecker sequence in four dimensions, two for the point and two for the direction, eight times with
+shifts of their own: what these eight find differs as much as each errs. Each surface begins at another place of the
+sequence, so that errors of many surfaces do not add up.
 """
 
 import math
@@ -26,6 +26,8 @@ REPLICATES, _DIMENSIONS = 8, 4
 # The steps of the sequence times 2^64: 1/g, 1/g^2, ... for the root g of g^5 = g + 1 (Roberts 2018).
 _ROOT = 1.1673039782614187
 _STEPS = np.array([int(2.0**64 / _ROOT**k) for k in range(1, _DIMENSIONS + 1)], np.uint64)
+# The places at which surfaces begin.
+BEGINS = 512
 # The golden ratio times 2^64, by which SplitMix64 counts.
 WEYL = np.uint64(0x9E3779B97F4A7C15)
 # The columns of a ray: the share of the area before its point, the place across there, and the direction in the frame.
@@ -90,10 +92,16 @@ def frames_of(normals: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate([x, np.cross(z, x), z], axis=1)
 
 
+def begins_of(rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Where in the sequence some rows begin, (rows,)."""
+    places: NDArray[np.int64] = (mixed(rows.astype(np.uint64) + WEYL) % np.uint64(BEGINS)).astype(np.int64)
+    return places * REPLICATES
+
+
 @lru_cache(maxsize=64)
 def rays_from(begin: int, count: int) -> NDArray[np.float64]:
-    """The rays from ``begin`` on that every surface sends, (count, RAY)."""
-    rays = np.arange(begin, begin + count, dtype=np.uint64)
+    """The rays from ``begin`` on, ``count`` of a surface and those before which others begin, (n, RAY)."""
+    rays = np.arange(begin, begin + count + BEGINS * REPLICATES, dtype=np.uint64)
     numbers = np.arange(1, REPLICATES * _DIMENSIONS + 1, dtype=np.uint64) * WEYL
     shifts = mixed(numbers).reshape(REPLICATES, _DIMENSIONS)[rays % np.uint64(REPLICATES)]
     bits = shifts + (rays // np.uint64(REPLICATES))[:, None] * _STEPS
@@ -126,17 +134,21 @@ def _direction(frame, ray, side):
 
 
 @kernel
-def aim_rows(first, members, ends, corners, frames, both, above, rays, rows, origins, directions, faces, codes):
+def aim_rows(
+    first, members, ends, corners, frames, both, above, rays, begins, count, rows, origins, directions, faces, codes
+):  # fmt: skip
     """Write the rays of some rows: the first of each, then the second of each, and so on.
 
     first, members ... above  the arrays of ``Senders``
-    rays                      (n, RAY) float64, of ``rays_from``
-    origins, directions       (n * rows, 3) float64
-    faces, codes              (n * rows,) int64: the face that each ray leaves, and the bits of ``starts.record``
+    rays                      (n, RAY) float64, of ``rays_from``; that of a row and number k is the one at begins + k
+    begins                    (rows,) int64, of ``begins_of``
+    count                     of the rays of each row
+    origins, directions       (count * rows, 3) float64
+    faces, codes              (count * rows,) int64: the face that each ray leaves, and the bits of ``starts.record``
     """
-    for k in range(len(rays)):
-        ray = offset(pointer(rays), RAY * k)
+    for k in range(count):
         for s in range(len(rows)):
+            ray = offset(pointer(rays), RAY * (begins[s] + k))
             low, i, share = first[rows[s]], k * len(rows) + s, load(ray, SHARE)
             member = _member_at(pointer(ends), low, first[rows[s] + 1], share)
             before = ends[member - 1] if member > low else 0.0

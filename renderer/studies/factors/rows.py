@@ -12,7 +12,7 @@ from renderer.numerics.mixing import mixed
 from renderer.ordering.morton import order_along_curve
 from renderer.queryable import Built
 from renderer.results.hits import Hits
-from renderer.studies.factors.aim import WEYL, Senders, aim_rows, rays_from
+from renderer.studies.factors.aim import WEYL, Senders, aim_rows, begins_of, rays_from
 from renderer.studies.factors.surfaces import Surfaces
 from renderer.studies.factors.tally import tally_rows, write_keys
 from renderer.system.threads import for_chunks
@@ -171,7 +171,7 @@ def _hits_of(tracing: Tracing, rows: Integers, begin: int, count: int) -> Genera
     total, (mesh, tree) = len(rows) * count, tracing.built
     origins, moved, directions = np.empty((3, total, 3))
     faces, codes = np.empty((2, total), np.int64)
-    aim_rows(*tracing.senders, rays_from(begin, count), rows, origins, directions, faces, codes)
+    aim_rows(*tracing.senders, rays_from(begin, count), begins_of(rows), count, rows, origins, directions, faces, codes)
     starts = make_starts(total, mesh)
     leaving, own = Leaving(faces, codes, np.empty((0, 3))), starts[HEAD:].view(np.float64).reshape(total, ROW)
     # None is too far from its face: it was placed there.
