@@ -157,10 +157,10 @@ def test_backs_are_counted_apart_with_a_warning():
     vertices, faces = joined((plates, faces), (plates + np.eye(3)[2], faces))
     octree, groups = Octree(vertices, faces), [0, 0, 1, 1]
     with pytest.warns(UserWarning, match="surface 0 most"):
-        found = view_factors(octree, groups)
+        found = view_factors(octree, groups, rtol=0.005)
     check_laws(found)
     assert found.exchange.nnz == 0
-    assert found.backs == pytest.approx([OPPOSITE, 0.0], abs=0.01)
+    assert found.backs == pytest.approx([OPPOSITE, 0.0], abs=0.02)
 
 
 def test_points_see_the_corner_of_a_room_by_lamberts_formula():
