@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +11,7 @@ from renderer.arguments.arrays import real_argument
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.studies.factors.free import RayExchange
-from renderer.studies.factors.result import ViewFactors
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
-else:
-    csr_array = Any
+from renderer.studies.factors.result import ViewFactors, csr_array
 
 Floats = NDArray[np.float64]
 # A surface of which no more is left sees nothing but backs: some roundings of sums that are 1.
