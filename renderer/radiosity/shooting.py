@@ -229,7 +229,7 @@ class _Traced:
     def __init__(self, scene: Queries | RayScene, ray_rtol: float, max_rays: int, threads: int | None) -> None:
         searched = octree_of(scene)
         workers = searched.threads if threads is None else checked_threads(threads)
-        surfaces = check_surfaces(searched.mesh, None, "front", None)
+        surfaces = check_surfaces(searched, None, "front", None)
         senders = senders_of(searched.mesh, surfaces)
         self.areas = surfaces.areas
         self._tracing = Tracing(searched._built, surfaces, senders, *check_effort(ray_rtol, max_rays), workers, False)

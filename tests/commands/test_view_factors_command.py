@@ -37,6 +37,12 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_room(tmp_path_factory.mktemp("room"))
 
 
+REMEDY = (
+    "which does not count; something stands on it, or the faces that it sees are turned the wrong way: turn them, "
+    "or use --sides both"
+)
+
+
 def study(*words: object) -> int:
     return main(["study", "viewfactors", *map(str, words), "--quiet"])
 
@@ -271,7 +277,7 @@ def test_backs_that_are_seen_are_named_with_the_option(tmp_path: Path, capsys: p
     )
     found = found_of(tmp_path / "f.npz", tmp_path / "p.obj", "--groups", "objects", *FEW)
     said = f"1 of 2 surfaces see backs of faces, surface ceiling most: {100 * found.backs[1]:.3g} % of what it sends"
-    assert capsys.readouterr().err == f"octree-render: {said}; turn these faces, or use --sides both\n"
+    assert capsys.readouterr().err == f"octree-render: {said}, {REMEDY}\n"
     found_of(tmp_path / "f.npz", tmp_path / "p.obj", "--groups", "objects", "--sides", "both", *FEW)
     assert capsys.readouterr().err == ""
 

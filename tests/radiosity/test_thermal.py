@@ -156,12 +156,13 @@ def test_adiabatic_rooms_apart_from_the_others_are_named():
         net_heat(enclosures.factors(np.ones(4), blocks), 0.5, [300.0, np.nan, np.nan, np.nan])
 
 
-def test_what_stands_on_a_floor_covers_it():
-    """A box without a bottom on the floor of a room: heat is that of the floor that is seen, and adds up to 0."""
+@cases("has_bottom", [False, True])
+def test_what_stands_on_a_floor_covers_it(has_bottom):
+    """A box on the floor of a room: heat is that of the floor that is seen, and adds up to 0."""
     room, thing = box((0, 0, 0), (4, 3, 2)), box((1, 1, 0), (2, 2, 1))
-    sides = thing.faces[thing.face_normals()[:, 2] > -0.5]
+    sides = thing.faces[thing.face_normals()[:, 2] > (-2.0 if has_bottom else -0.5)]
     octree = Octree.from_mesh(Mesh.concatenate(Mesh(room.vertices, room.faces[:, ::-1]), Mesh(thing.vertices, sides)))
-    with pytest.warns(UserWarning, match="surface 4 most"):
+    with pytest.warns(UserWarning, match="see backs of faces"):
         found = view_factors(octree, np.repeat(np.arange(7), [2] * 6 + [len(sides)]), rtol=0.005)
     assert found.backs[4] == pytest.approx(1 / 12, abs=0.005)
     heat = net_heat(found, 0.8, [293, 293, 293, 293, 303, 291, 300])

@@ -97,5 +97,6 @@ def backs_message(backs: Floats, names: Sequence[object], remedy: str) -> str:
     worst = int(backs.argmax())
     return (
         f"{seen} of {len(backs)} surfaces see backs of faces, surface {names[worst]} most: "
-        f"{100.0 * backs[worst]:.3g} % of what it sends; turn these faces, or {remedy}"
+        f"{100.0 * backs[worst]:.3g} % of what it sends, which does not count; something stands on it, or the faces "
+        f"that it sees are turned the wrong way: turn them, or {remedy}"
     )

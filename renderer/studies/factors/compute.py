@@ -144,7 +144,7 @@ def checked_tracing(
 ) -> Tracing:
     """The arguments of ``view_factors``, checked; ``least`` rays of a surface at least."""
     searched = octree_of(octree)
-    surfaces = check_surfaces(searched.mesh, groups, sides, transmittance)
+    surfaces = check_surfaces(searched, groups, sides, transmittance)
     rtol, max_rays = check_effort(rtol, max_rays, least)
     workers = searched.threads if threads is None else checked_threads(threads)
     senders = senders_of(searched.mesh, surfaces)

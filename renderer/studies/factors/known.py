@@ -91,7 +91,8 @@ def known_of(tracing: Tracing, worth: Worth, work: Work) -> KnownPairs:
     two_sided = bool(surfaces.both.all())
     sound = ((surfaces.transmittance == 0.0) & (surfaces.both == two_sided))[faces].all(axis=1)
     exchange, known = work.pairs(tracing, faces)
-    unknown = np.bincount(pair, ~(known & sound), len(sizes)) > 0
-    values: Floats = np.where(own, 2.0, 1.0) * np.bincount(pair, exchange, len(sizes))
+    covered = surfaces.covered[faces].any(axis=1)
+    unknown = np.bincount(pair, ~(known & sound | covered), len(sizes)) > 0
+    values: Floats = np.where(own, 2.0, 1.0) * np.bincount(pair, np.where(covered, 0.0, exchange), len(sizes))
     kept = ~unknown
     return KnownPairs(worth.rows[kept], worth.columns[kept], values[kept])

@@ -89,7 +89,7 @@ def view_factors_from(
     request = check_request(octree, points, normals, leaving, threads, progress)
     expect(len(request.shape) == 1, "points", "shape (m, 3)", f"shape {(*request.shape, 3)}")
     mesh, tree = request.octree._built
-    surfaces = check_surfaces(mesh, groups, sides, transmittance)
+    surfaces = check_surfaces(request.octree, groups, sides, transmittance)
     effort = check_effort(rtol, max_rays)
     places = request.places
     found = on_surface(tree, mesh, places.points, places.leaving, request.threads)

@@ -154,19 +154,26 @@ def in_order(parts: list[tuple[Integers, RowHits]]) -> RowHits:
 
 def keys_of(tracing: Tracing, rows: Integers, begin: int, count: int) -> Generator[None, None, Integers]:
     """What the rays from ``begin`` on hit, ``count`` of each row: keys as of ``tally_rows``, (rows, count)."""
-    keys = np.empty((len(rows), count), np.int64)
+    keys, surfaces = np.empty((len(rows), count), np.int64), tracing.surfaces
     width = min(count, CHUNK)
     height = max(1, CHUNK // width)
     for top in range(0, len(rows), height):
         for left in range(0, count, width):
             own, some = slice(top, top + height), min(width, count - left)
-            hits = yield from _hits_of(tracing, rows[own], begin + left, some)
-            write_keys(hits.face, hits.side, tracing.surfaces.of_face, tracing.surfaces.both,
-                       tracing.surfaces.number, begin + left, keys[own, left : left + some])  # fmt: skip
+            found = yield from _hits_of(tracing, rows[own], begin + left, some)
+            write_keys(found.left, found.hits.face, found.hits.side, surfaces.of_face, surfaces.both, surfaces.covered,
+                       surfaces.number, begin + left, keys[own, left : left + some])  # fmt: skip
     return keys
 
 
-def _hits_of(tracing: Tracing, rows: Integers, begin: int, count: int) -> Generator[None, None, Hits]:
+class _Found(NamedTuple):
+    """The face that each ray left, -1 for none, and what it hit."""
+
+    left: Integers
+    hits: Hits
+
+
+def _hits_of(tracing: Tracing, rows: Integers, begin: int, count: int) -> Generator[None, None, _Found]:
     """The hits of the rays from ``begin`` on: the first of each row, then the second of each, and so on."""
     total, (mesh, tree) = len(rows) * count, tracing.built
     origins, moved, directions = np.empty((3, total, 3))
@@ -179,7 +186,7 @@ def _hits_of(tracing: Tracing, rows: Integers, begin: int, count: int) -> Genera
     hits = yield from _closest(tracing, RayBatch(moved, directions, *_EVERYWHERE, starts))
     if tracing.surfaces.transmittance.any():
         yield from _pass_through(tracing, hits, directions, rows, begin)
-    return hits
+    return _Found(faces, hits)
 
 
 def _closest(tracing: Tracing, rays: RayBatch) -> Generator[None, None, Hits]:

@@ -11,6 +11,8 @@ from renderer.arguments.arrays import real_argument
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
+from renderer.queryable import Queries
+from renderer.studies.factors.covered import covered_faces
 from renderer.studies.translucent import check_transmittance
 from renderer.trace.batch import whole_numbers
 
@@ -26,6 +28,7 @@ class Surfaces(NamedTuple):
     weights        (F,) float64: the share of each face in that
     both           (F,) bool: whether a face sends from both sides
     transmittance  (F,) float64
+    covered        (F,) bool: whether a face lies on another's back, and sends and receives nothing
     """
 
     of_face: Integers
@@ -33,6 +36,7 @@ class Surfaces(NamedTuple):
     weights: Floats
     both: NDArray[np.bool_]
     transmittance: Floats
+    covered: NDArray[np.bool_]
 
     @property
     def number(self) -> int:
@@ -40,25 +44,28 @@ class Surfaces(NamedTuple):
         return len(self.areas)
 
 
-def check_surfaces(mesh: Mesh, groups: ArrayLike | None, sides: str, transmittance: ArrayLike | None) -> Surfaces:
+def check_surfaces(octree: Queries, groups: ArrayLike | None, sides: str, transmittance: ArrayLike | None) -> Surfaces:
     """The arguments of ``view_factors``, checked. Raises ``ValueError`` naming argument and row."""
-    count = len(mesh.faces)
+    mesh, count = octree.mesh, len(octree.mesh.faces)
     expect(count > 0, "octree", "a mesh with faces", "none")
     shares = np.zeros(count) if transmittance is None else check_transmittance("transmittance", transmittance, count)
     known = isinstance(sides, str) and sides in ("front", "both")
     expect(known, "sides", "'front' or 'both'", repr(sides))
     of_face = np.arange(count) if groups is None else _check_groups(groups, count)
     both = (shares > 0.0) | (sides == "both")
+    sizes = areas_of(mesh)
     # rule: area-that-sends
-    weights = areas_of(mesh) * np.where(both, 2.0, 1.0) * (1.0 - shares)
+    weights = sizes * np.where(both, 2.0, 1.0) * (1.0 - shares)
     areas = np.asarray(np.bincount(of_face, weights), np.float64)
     empty = ~(areas > 0.0)
     if empty.any():
         row = int(empty.argmax())
         faces = np.flatnonzero(of_face == row)[:4].tolist()
+        clear = f"1 for all faces of surface {row}"
+        expect(not (sizes[of_face == row] > 0.0).any(), "transmittance", "less than 1 in each surface", clear)
         expect(False, "groups", "surfaces with an area", f"none in surface {row}, of the faces {faces}")
     expect(bool(np.isfinite(areas).all()), "octree", "areas below the largest float64", "larger ones")
-    return Surfaces(of_face, areas, weights, both, shares)
+    return Surfaces(of_face, areas, weights, both, shares, covered_faces(octree) & ~both)
 
 
 def areas_of(mesh: Mesh) -> Floats:

@@ -12,23 +12,29 @@ _HALF = 0.5
 
 
 @kernel
-def write_keys(faces, sides, of_face, both, number, begin, keys):
+def write_keys(left, faces, sides, of_face, both, covered, number, begin, keys):
     """Write the keys of ``tally_rows`` for the rays from ``begin`` on of some rows.
 
+    left           (n * rows,) int64: the face that each ray left, -1 for none
     faces, sides   (n * rows,) int64: what each ray hit, -1 for nothing, and from which side; the first ray of each row,
                    then the second of each, and so on
-    of_face, both  as of ``Surfaces``; ``number`` of them
+    of_face, both, covered
+                   as of ``Surfaces``; ``number`` of them
     keys           (rows, n) int64
     """
     rows, count = keys.shape
     for k in range(count):
         for row in range(rows):
-            face = faces[k * rows + row]
+            i = k * rows + row
+            face, own = faces[i], left[i]
             # rule: sky-of-row
             target = number + SKY
             if face >= 0:
                 # rule: backs-of-faces
-                target = of_face[face] if sides[k * rows + row] > 0 or both[face] else number + BACK
+                seen = (sides[i] > 0 or both[face]) and not covered[face]
+                target = of_face[face] if seen else number + BACK
+            if own >= 0 and covered[own]:
+                target = number + BACK
             keys[row, k] = target * REPLICATES + (begin + k) % REPLICATES
 
 

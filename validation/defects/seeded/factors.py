@@ -21,6 +21,7 @@ _CHANGES: dict[str, Change] = {
     "what is let through is stopped, the rest goes on": Rule("transmitted-share", compare(">=")),
     "errors are stated a third as large": Rule("error-of-replicates", value("_ / 9.0")),
     "rows of rays that are traced again are not balanced": Rule("balance-of-rays", drop),
+    "what lies on others radiates": Rule("backs-on-faces", compare(">")),
     "what lies behind backs radiates": Rule("area-behind-backs", value("areas + 0.0 * _")),
     "surfaces let nothing through of what they send": Rule("area-that-sends", without("*", 2)),
 }
