@@ -70,9 +70,9 @@ def study_view_factors(options: argparse.Namespace) -> None:
     _say_backs(found)
     if not options.quiet:
         outputs, rays = ", ".join(map(str, options.output)), int(found.rays.sum())
-        worst = found.errors.data.max(initial=0.0)
+        worst, sky = found.errors.data.max(initial=0.0), (found.areas * found.sky).sum() / found.areas.sum()
         say(f"{outputs}: view factors of {len(found.areas):,} surfaces in {seconds:.2f} s, by {rays:,} rays; largest "
-            f"standard error {worst:.2g}")  # fmt: skip
+            f"standard error {worst:.2g}; {100.0 * sky:.3g} % of what they send meets nothing")  # fmt: skip
     # Last, so that no work is lost if a file cannot be written.
     remove_parts(folder)
 

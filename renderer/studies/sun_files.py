@@ -19,6 +19,8 @@ Floats = NDArray[np.float64]
 # as the sun is seen there.
 _ELEVATIONS = ("apparent_elevation", "elevation", "altitude")
 _AZIMUTH, _HOURS = "azimuth", "hours"
+# Words that are numbers.
+_NUMBERS = ("nan", "inf", "infinity")
 
 
 class Suns(NamedTuple):
@@ -43,7 +45,8 @@ def suns_of(path: Path, up: Literal["x", "y", "z"] = "z") -> Suns:
     except ValueError as error:
         raise ValueError(f"--suns: expected a text, got {path}: {error}") from None
     lines = [line for line in text.splitlines() if line.split("#")[0].strip()]
-    if lines and _AZIMUTH in (table := _cells(lines))[0]:
+    table = _cells(lines)
+    if any(name[:1].isalpha() and name not in _NUMBERS for name in table[0]):
         return _of_table(table, path, up)
     return _of_rows(lines, path)
 
@@ -61,6 +64,8 @@ def _of_rows(lines: list[str], path: Path) -> Suns:
 
 def _cells(lines: list[str]) -> list[list[str]]:
     """The cells of a table, by the separator in its first line; the names of the first line in small letters."""
+    if not lines:
+        return [[]]
     separator = next((mark for mark in ",;\t" if mark in lines[0]), None)
     rows = [line.split() for line in lines] if separator is None else list(csv.reader(lines, delimiter=separator))
     return [[name.strip().lower() for name in rows[0]], *rows[1:]]
@@ -68,6 +73,7 @@ def _cells(lines: list[str]) -> list[list[str]]:
 
 def _of_table(table: list[list[str]], path: Path, up: Literal["x", "y", "z"]) -> Suns:
     names, rows = table[0], table[1:]
+    expect(_AZIMUTH in names, "--suns", f"a column {_AZIMUTH}", f"{', '.join(names)} in {path}")
     elevation = next((name for name in _ELEVATIONS if name in names), None)
     expect(elevation is not None, "--suns", f"a column {' or '.join(_ELEVATIONS)}", f"{', '.join(names)} in {path}")
     expect(bool(rows), "--suns", "a row for each sun below the names", f"none in {path}")

@@ -136,7 +136,7 @@ def test_a_table_of_angles_is_read_by_the_names_of_its_columns(name: str, tmp_pa
         ("azimuth,elevation\n1,2\n3\n", "--suns: expected elevation in each row, got none in row 1 of "),
         ("azimuth,elevation\n1,x\n", "--suns: expected numbers in the column elevation, got .*suns.csv: could not"),
         ("azimuth,elevation\n1,91\n", "--suns: elevation: expected degrees from -90 to 90, got 91.0 in row 0 of "),
-        ("elevation,hours\n1,91\n", "--suns: expected rows of 3 or 4 numbers"),
+        ("elevation,hours\n1,91\n", "--suns: expected a column azimuth, got elevation, hours in"),
     ],
 )
 def test_what_is_no_table_of_suns_is_said(text: str, said: str, tmp_path: Path) -> None:
