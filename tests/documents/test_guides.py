@@ -170,11 +170,12 @@ def options_of(parser: Any) -> set[str]:
     return {name for action in parser._actions for name in action.option_strings} - {"-h", "--help"}
 
 
-def test_the_options_of_render_are_all_there() -> None:
+@cases(("command", "column"), [("render", "option"), ("radiosity", "option of radiosity")])
+def test_the_options_of_pictures_are_all_there(command: str, column: str) -> None:
     (parser,) = [a for a in make_parser()._actions if a.dest == "command" or (a.choices and "render" in a.choices)]
-    rows = tables(text_of("rendering"))["option"]
+    rows = tables(text_of("rendering"))[column]
     told = {name for row in rows for name in re.findall(r"`(-[\w-]+)`", row[0])}
-    assert told == options_of(parser.choices["render"])  # type: ignore[index,call-overload]
+    assert told == options_of(parser.choices[command])  # type: ignore[index,call-overload]
 
 
 def test_the_options_of_octree_validate_are_all_there() -> None:
