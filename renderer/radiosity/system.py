@@ -62,6 +62,15 @@ def solved(system: System, amplification: float, rtol: float, max_iterations: in
 
     Raises ``ValueError`` naming ``rtol`` if rounding alone exceeds that, or ``max_iterations`` if there are not enough.
     """
+    # By a power of two, so that no square overflows or vanishes.
+    unit = 2.0 ** float(np.frexp(system.source.max(initial=0.0))[1])
+    found = _solved(system._replace(source=system.source / unit), amplification, rtol, max_iterations)
+    values, gathered, residual, bound, iterations = found
+    return Solution(values * unit, gathered * unit, residual * unit, bound * unit, iterations)
+
+
+def _solved(system: System, amplification: float, rtol: float, max_iterations: int) -> Solution:
+    """``solved`` for sources whose largest is from 1/2 to 1, or all 0."""
     operator, wanted, weights = _symmetric(system)
     z, iterations, tolerance = np.zeros(wanted.size), 0, rtol
     while True:

@@ -21,6 +21,9 @@ Floats = NDArray[np.float64]
 
 # The Stefan-Boltzmann constant in W / (m^2 K^4): CODATA 2018 and 2022, exact by the SI of 2019 but for its digits.
 SIGMA = 5.670374419e-8
+# Far above any star, and far below where fourth powers overflow.
+_HOTTEST = 1e20
+_KELVIN = f"numbers from 0 to {_HOTTEST:g} in kelvin, or NaN for adiabatic surfaces"
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +145,7 @@ def net_heat(
     n = len(exchange.areas)
     degrees = _column("temperature", temperature, n)
     adiabatic = np.isnan(degrees)
-    reject_rows("temperature", "numbers >= 0 in kelvin, or NaN for adiabatic surfaces", degrees, _is_no_kelvin(degrees))
+    reject_rows("temperature", _KELVIN, degrees, _is_no_kelvin(degrees))
     share = np.where(adiabatic, 0.0, _column("emissivity", emissivity, n))
     reject_rows("emissivity", "numbers > 0 and at most 1", share, ~(adiabatic | ((share > 0.0) & (share <= 1.0))))
     emitted = SIGMA * np.where(adiabatic, 0.0, degrees) ** 4
@@ -171,13 +174,13 @@ def _column(argument: str, values: ArrayLike, n: int) -> Floats:
 
 
 def _is_no_kelvin(degrees: Floats) -> NDArray[np.bool_]:
-    return (degrees < 0.0) | (degrees == np.inf)
+    return (degrees < 0.0) | (degrees > _HOTTEST)
 
 
 def _sky_kelvin(degrees: float | None) -> float:
     given = real_argument("sky_temperature", 0.0 if degrees is None else degrees)
-    good = given.ndim == 0 and bool(0.0 <= given < np.inf)
-    expect(good, "sky_temperature", "a finite number >= 0 in kelvin, or None", repr(degrees))
+    good = given.ndim == 0 and bool(0.0 <= given <= _HOTTEST)
+    expect(good, "sky_temperature", f"a number from 0 to {_HOTTEST:g} in kelvin, or None", repr(degrees))
     return float(given)
 
 

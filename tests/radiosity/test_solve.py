@@ -288,3 +288,11 @@ def test_bad_input_is_named(arguments, message):
     with pytest.raises(ValueError) as caught:
         radiosity(**given)
     assert str(caught.value).startswith(message)
+
+
+@cases("size", [1e-165, 1e-300, 1e200])
+def test_sources_of_any_size_are_solved(size):
+    """Squares of such numbers are 0 or infinite."""
+    factors, emission, rho, _ = drawn(3, 10)
+    found = radiosity(factors, size * emission, rho)
+    np.testing.assert_allclose(found.values / size, radiosity(factors, emission, rho).values, rtol=1e-5)

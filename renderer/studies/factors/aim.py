@@ -1,8 +1,8 @@
 """Where rays start on a surface, and where they go: points uniform by area, directions by the cosine law.
 
 The rays follow a Kronecker sequence in four dimensions, two for the point and two for the direction, eight times with
-shifts of their own: what these eight find differs as much as each errs. Each surface begins at another place of the
-sequence, so that errors of many surfaces do not add up.
+shifts of their own: what these eight find differs as much as each errs. Each surface shifts the points and turns the
+directions by numbers of its own, so that errors of many surfaces do not add up.
 """
 
 import math
@@ -26,12 +26,12 @@ REPLICATES, _DIMENSIONS = 8, 4
 # The steps of the sequence times 2^64: 1/g, 1/g^2, ... for the root g of g^5 = g + 1 (Roberts 2018).
 _ROOT = 1.1673039782614187
 _STEPS = np.array([int(2.0**64 / _ROOT**k) for k in range(1, _DIMENSIONS + 1)], np.uint64)
-# The places at which surfaces begin.
-BEGINS = 512
 # The golden ratio times 2^64, by which SplitMix64 counts.
 WEYL = np.uint64(0x9E3779B97F4A7C15)
 # The columns of a ray: the share of the area before its point, the place across there, and the direction in the frame.
 SHARE, ACROSS, DIRECTION, RAY = 0, 1, 2, 5
+# Those of a row: what is added to both, and the cosine and sine by which directions are turned.
+COSINE, SINE, TURN = 2, 3, 4
 
 
 class Senders(NamedTuple):
@@ -92,16 +92,18 @@ def frames_of(normals: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate([x, np.cross(z, x), z], axis=1)
 
 
-def begins_of(rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Where in the sequence some rows begin, (rows,)."""
-    places: NDArray[np.int64] = (mixed(rows.astype(np.uint64) + WEYL) % np.uint64(BEGINS)).astype(np.int64)
-    return places * REPLICATES
+def turns_of(rows: NDArray[np.int64]) -> NDArray[np.float64]:
+    """By what rays of some rows differ from those of others, (rows, TURN): they depend on the row alone."""
+    own = np.arange(1, 4, dtype=np.uint64)
+    numbers = (rows.astype(np.uint64)[:, None] * np.uint64(3) + own).astype(np.uint64)
+    share, across, turn = ((mixed(numbers * WEYL) >> np.uint64(11)).astype(np.float64) * 2.0**-53).T
+    return np.stack([share, across, np.cos(2.0 * np.pi * turn), np.sin(2.0 * np.pi * turn)], axis=1)
 
 
 @lru_cache(maxsize=64)
 def rays_from(begin: int, count: int) -> NDArray[np.float64]:
-    """The rays from ``begin`` on, ``count`` of a surface and those before which others begin, (n, RAY)."""
-    rays = np.arange(begin, begin + count + BEGINS * REPLICATES, dtype=np.uint64)
+    """The rays from ``begin`` on, (count, RAY)."""
+    rays = np.arange(begin, begin + count, dtype=np.uint64)
     numbers = np.arange(1, REPLICATES * _DIMENSIONS + 1, dtype=np.uint64) * WEYL
     shifts = mixed(numbers).reshape(REPLICATES, _DIMENSIONS)[rays % np.uint64(REPLICATES)]
     bits = shifts + (rays // np.uint64(REPLICATES))[:, None] * _STEPS
@@ -126,40 +128,47 @@ def _member_at(ends, begin, end, share):
 
 
 @inlined
-def _direction(frame, ray, side):
+def _shifted(ray, turn, column):
+    """A number of a ray in [0, 1), shifted by that of a row."""
+    moved = load(ray, column) + load(turn, column)
+    return moved if moved < 1.0 else moved - 1.0
+
+
+@inlined
+def _direction(frame, ray, turn, side):
     """The direction of a ray, on a side of a frame's plane."""
-    x, y, z = three(ray, DIRECTION)
-    across = add(scale(row3(frame, 0), x), scale(row3(frame, 1), y))
+    (x, y, z), cosine, sine = three(ray, DIRECTION), load(turn, COSINE), load(turn, SINE)
+    across = add(scale(row3(frame, 0), cosine * x - sine * y), scale(row3(frame, 1), sine * x + cosine * y))
     return add(across, scale(row3(frame, 2), side * z))
 
 
 @kernel
 def aim_rows(
-    first, members, ends, corners, frames, both, above, rays, begins, count, rows, origins, directions, faces, codes
+    first, members, ends, corners, frames, both, above, rays, turns, rows, origins, directions, faces, codes
 ):  # fmt: skip
     """Write the rays of some rows: the first of each, then the second of each, and so on.
 
     first, members ... above  the arrays of ``Senders``
-    rays                      (n, RAY) float64, of ``rays_from``; that of a row and number k is the one at begins + k
-    begins                    (rows,) int64, of ``begins_of``
-    count                     of the rays of each row
+    rays                      (count, RAY) float64, of ``rays_from``
+    turns                     (rows, TURN) float64, of ``turns_of``
     origins, directions       (count * rows, 3) float64
     faces, codes              (count * rows,) int64: the face that each ray leaves, and the bits of ``starts.record``
     """
-    for k in range(count):
+    for k in range(len(rays)):
+        ray = offset(pointer(rays), RAY * k)
         for s in range(len(rows)):
-            ray = offset(pointer(rays), RAY * (begins[s] + k))
-            low, i, share = first[rows[s]], k * len(rows) + s, load(ray, SHARE)
+            turn = offset(pointer(turns), TURN * s)
+            low, i, share = first[rows[s]], k * len(rows) + s, _shifted(ray, turn, SHARE)
             member = _member_at(pointer(ends), low, first[rows[s] + 1], share)
             before = ends[member - 1] if member > low else 0.0
             inside, side = (share - before) / (ends[member] - before), 1.0
             if both[member]:
                 inside, side = (2.0 * inside, 1.0) if inside < 0.5 else (2.0 * inside - 1.0, -1.0)
             # Uniform in a triangle: the square root of one number, and the other across.
-            root, across = math.sqrt(inside), load(ray, ACROSS)
+            root, across = math.sqrt(inside), _shifted(ray, turn, ACROSS)
             place, frame = offset(pointer(corners), 9 * member), offset(pointer(frames), 9 * member)
             sides = add(scale(row3(place, 1), root * (1.0 - across)), scale(row3(place, 2), root * across))
             put3(pointer(origins), 3 * i, add(three(place, 0), sides))
-            put3(pointer(directions), 3 * i, _direction(frame, ray, side))
+            put3(pointer(directions), 3 * i, _direction(frame, ray, turn, side))
             store(pointer(faces), i, members[member])
             store(pointer(codes), i, np.int64(KNOWN | (ABOVE if (side > 0.0) == above[member] else 0)))

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.arguments.arrays import real_argument
 from renderer.errors import expect
 from renderer.jit.decorators import kernel
 from renderer.studies.factors.aim import REPLICATES
@@ -41,8 +42,11 @@ class RayExchange:
         self.shape = len(areas), len(areas)
 
     def __matmul__(self, x: Floats) -> Floats:
-        """The product with values (n,) or (n, c)."""
-        columns = np.ascontiguousarray(x, np.float64).reshape(len(x), -1)
+        """The product with values (n,) or (n, c). Raises ``ValueError`` for another shape."""
+        x = real_argument("x", x)
+        n = len(self.levels)
+        expect(x.ndim in (1, 2) and len(x) == n, "x", f"shape ({n},) or ({n}, c)", f"shape {x.shape}")
+        columns = np.ascontiguousarray(x, np.float64).reshape(n, -1)
         product = np.zeros(columns.shape)
         multiply(self.targets, self.density, columns * self.levels[:, None], product)
         return (product * self.levels[:, None]).reshape(x.shape)

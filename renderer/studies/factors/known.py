@@ -52,7 +52,7 @@ class KnownPairs(NamedTuple):
 def pairs_worth(tracing: Tracing, hits: RowHits | None) -> Worth | None:
     """The pairs that are worth the time: all of few faces, and then ``hits`` is not read; None if they are needed.
 
-    A row takes 1 / rtol^2 random rays, of which each entry that needs none saves its share.
+    A row takes 1 / rtol^2 random rays, but at most ``max_rays``, of which each entry that needs none saves its share.
     """
     surfaces = tracing.surfaces
     number, faces = surfaces.number, len(surfaces.of_face)
@@ -63,7 +63,8 @@ def pairs_worth(tracing: Tracing, hits: RowHits | None) -> Worth | None:
     inner = hits.targets < number
     rows, targets = hits.rows[inner], hits.targets[inner]
     pairs, of_pair = np.unique(np.minimum(rows, targets) * number + np.maximum(rows, targets), return_inverse=True)
-    saved = np.bincount(of_pair, hits.counts[inner] / hits.rays[rows]) / tracing.rtol**2
+    rays = min(1.0 / tracing.rtol**2, float(tracing.max_rays))
+    saved = np.bincount(of_pair, hits.counts[inner] / hits.rays[rows]) * rays
     members = np.bincount(surfaces.of_face, minlength=number)
     low, high = pairs // number, pairs % number
     # In floats, as groups of a million faces have more pairs than int64 holds.

@@ -12,7 +12,7 @@ from renderer.numerics.mixing import mixed
 from renderer.ordering.morton import order_along_curve
 from renderer.queryable import Built
 from renderer.results.hits import Hits
-from renderer.studies.factors.aim import WEYL, Senders, aim_rows, begins_of, rays_from
+from renderer.studies.factors.aim import WEYL, Senders, aim_rows, rays_from, turns_of
 from renderer.studies.factors.surfaces import Surfaces
 from renderer.studies.factors.tally import tally_rows, write_keys
 from renderer.system.threads import for_chunks
@@ -31,6 +31,8 @@ Update = Callable[[int], object] | None
 # The rays of a row at first: the least that tells a share of a hundredth from one of a fiftieth.
 FIRST_RAYS = 256
 ROWS = CHUNK // FIRST_RAYS
+# Rays of rows that are counted together: 16 MB, and some copies of them.
+_KEYS = 1 << 21
 _EVERYWHERE = (np.zeros(1), np.full(1, np.inf))
 
 
@@ -96,7 +98,8 @@ def trace_rows(tracing: Tracing, rows: Integers, known: Known, update: Update = 
     order = order_of(tracing.senders, rows)
 
     def trace(begin: int, end: int) -> Iterator[None]:
-        yield from _trace_until(tracing, order[begin:end], rows, known, parts)
+        none = np.empty((end - begin, 0), np.int64)
+        yield from _trace_until(tracing, order[begin:end], rows, known, parts, none)
 
     for_chunks(trace, len(rows), ROWS, tracing.threads, update)
     return in_order(parts)
@@ -108,13 +111,25 @@ def order_of(senders: Senders, rows: Integers) -> Integers:
 
 
 def _trace_until(
-    tracing: Tracing, places: Integers, rows: Integers, known: Known, parts: list[tuple[Integers, RowHits]]
+    tracing: Tracing,
+    places: Integers,
+    rows: Integers,
+    known: Known,
+    parts: list[tuple[Integers, RowHits]],
+    keys: Integers,
 ) -> Iterator[None]:
-    """Trace the rows at some places until each has small errors or its most rays; add what they hit to ``parts``."""
-    keys = np.empty((len(places), 0), np.int64)
+    """Trace the rows at some places until each has small errors or its most rays; add what they hit to ``parts``.
+
+    ``keys`` (places, n) are those of the rays that are traced.
+    """
     while len(places):
         rays = keys.shape[1]
         more = min(max(rays, FIRST_RAYS), tracing.max_rays - rays)
+        if len(places) > 1 and len(places) * (rays + more) > _KEYS:
+            half = len(places) // 2
+            for part in (slice(0, half), slice(half, None)):
+                yield from _trace_until(tracing, places[part], rows, known, parts, keys[part])
+            return
         new = yield from keys_of(tracing, rows[places], rays, more)
         keys = np.sort(np.concatenate([keys, new], axis=1), axis=1)
         hits, unfinished = _tally(keys, rows[places], known, tracing.rtol, rays + more == tracing.max_rays)
@@ -161,8 +176,8 @@ def keys_of(tracing: Tracing, rows: Integers, begin: int, count: int) -> Generat
         for left in range(0, count, width):
             own, some = slice(top, top + height), min(width, count - left)
             found = yield from _hits_of(tracing, rows[own], begin + left, some)
-            write_keys(found.left, found.hits.face, found.hits.side, surfaces.of_face, surfaces.both, surfaces.covered,
-                       surfaces.number, begin + left, keys[own, left : left + some])  # fmt: skip
+            write_keys(found.left, found.hits.face, found.hits.side, surfaces.of_face, surfaces.both, surfaces.twin,
+                       surfaces.covered, surfaces.number, begin + left, keys[own, left : left + some])  # fmt: skip
     return keys
 
 
@@ -178,7 +193,7 @@ def _hits_of(tracing: Tracing, rows: Integers, begin: int, count: int) -> Genera
     total, (mesh, tree) = len(rows) * count, tracing.built
     origins, moved, directions = np.empty((3, total, 3))
     faces, codes = np.empty((2, total), np.int64)
-    aim_rows(*tracing.senders, rays_from(begin, count), begins_of(rows), count, rows, origins, directions, faces, codes)
+    aim_rows(*tracing.senders, rays_from(begin, count), turns_of(rows), rows, origins, directions, faces, codes)
     starts = make_starts(total, mesh)
     leaving, own = Leaving(faces, codes, np.empty((0, 3))), starts[HEAD:].view(np.float64).reshape(total, ROW)
     # None is too far from its face: it was placed there.

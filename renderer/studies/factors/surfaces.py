@@ -12,7 +12,7 @@ from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.queryable import Queries
-from renderer.studies.factors.covered import covered_faces
+from renderer.studies.factors.covered import twins_of
 from renderer.studies.translucent import check_transmittance
 from renderer.trace.batch import whole_numbers
 
@@ -28,7 +28,7 @@ class Surfaces(NamedTuple):
     weights        (F,) float64: the share of each face in that
     both           (F,) bool: whether a face sends from both sides
     transmittance  (F,) float64
-    covered        (F,) bool: whether a face lies on another's back, and sends and receives nothing
+    twin, covered  as of ``covered.Twins``; a face that is covered sends and receives nothing
     """
 
     of_face: Integers
@@ -36,6 +36,7 @@ class Surfaces(NamedTuple):
     weights: Floats
     both: NDArray[np.bool_]
     transmittance: Floats
+    twin: Integers
     covered: NDArray[np.bool_]
 
     @property
@@ -65,7 +66,8 @@ def check_surfaces(octree: Queries, groups: ArrayLike | None, sides: str, transm
         expect(not (sizes[of_face == row] > 0.0).any(), "transmittance", "less than 1 in each surface", clear)
         expect(False, "groups", "surfaces with an area", f"none in surface {row}, of the faces {faces}")
     expect(bool(np.isfinite(areas).all()), "octree", "areas below the largest float64", "larger ones")
-    return Surfaces(of_face, areas, weights, both, shares, covered_faces(octree) & ~both)
+    twins = twins_of(octree)
+    return Surfaces(of_face, areas, weights, both, shares, twins.twin, twins.covered & ~both)
 
 
 def areas_of(mesh: Mesh) -> Floats:

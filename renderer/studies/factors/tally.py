@@ -12,13 +12,13 @@ _HALF = 0.5
 
 
 @kernel
-def write_keys(left, faces, sides, of_face, both, covered, number, begin, keys):
+def write_keys(left, faces, sides, of_face, both, twin, covered, number, begin, keys):
     """Write the keys of ``tally_rows`` for the rays from ``begin`` on of some rows.
 
     left           (n * rows,) int64: the face that each ray left, -1 for none
     faces, sides   (n * rows,) int64: what each ray hit, -1 for nothing, and from which side; the first ray of each row,
                    then the second of each, and so on
-    of_face, both, covered
+    of_face, both, twin, covered
                    as of ``Surfaces``; ``number`` of them
     keys           (rows, n) int64
     """
@@ -29,9 +29,13 @@ def write_keys(left, faces, sides, of_face, both, covered, number, begin, keys):
             face, own = faces[i], left[i]
             # rule: sky-of-row
             target = number + SKY
+            # Of the two sides of a plate, the ray sees the one that it comes to.
+            back = face >= 0 and sides[i] < 0 and not both[face]
+            if back and twin[face] >= 0:
+                face, back = twin[face], False
             if face >= 0:
                 # rule: backs-of-faces
-                seen = (sides[i] > 0 or both[face]) and not covered[face]
+                seen = not back and not covered[face]
                 target = of_face[face] if seen else number + BACK
             if own >= 0 and covered[own]:
                 target = number + BACK
