@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from cases import cases
 from pydantic import BaseModel
+from scipy.sparse import csr_array
 
 import renderer
 from renderer import (
@@ -121,6 +122,8 @@ def things() -> dict[str, Any]:
         "camera": EYE, "parallel camera": OrthographicCamera(eye=(0, 0, 6), target=(0, 0, 0), height=3),
         **{f"material {name}": material for name, material in MIXED.materials.items()}, "image": image,
         "pattern": studies.tregenza(), "places": studies.face_points(BALL), "study": Study("sky", {"patches": 9}),
+        "view factors": studies.view_factors(octree, sides="both", max_rays=256),
+        "view factors of points": studies.view_factors_from(octree, [[0, 0, 9]], [0, 0, -1], sides="both"),
         "scan": studies.scan(octree, [0, 0, 0], 9), "points": on_faces(octree).points,
         "scene of rays": ray_scene(), "scene of rays, empty": RayScene(),
         "hits of a scene": ray_scene().closest_hit(*RAYS), "all hits of a scene": ray_scene().all_hits(*RAYS),
@@ -165,6 +168,8 @@ def content(thing: Any) -> Any:
         return content(
             [thing.scene, thing.octree, thing.needs, list(thing.arrays), thing.touching, thing.tree.blocks]
         ), shown
+    if isinstance(thing, csr_array):
+        return thing.shape, content([thing.data, thing.indices, thing.indptr])
     if isinstance(thing, BaseModel):
         return type(thing), {name: content(getattr(thing, name)) for name in type(thing).model_fields}
     if isinstance(thing, BaseException):
