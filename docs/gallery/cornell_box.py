@@ -1,8 +1,8 @@
 """
-Light between surfaces
-======================
+The Cornell box by radiosity
+============================
 
-The Cornell box by radiosity: its only light is the lamp's emission. The red and the green wall colour what stands
+Surfaces light each other: the only light is the lamp's emission. The red and the green wall colour what stands
 beside them, and no picture after the first costs more than its rays.
 """
 

@@ -65,8 +65,8 @@ def save_lit(scene: Scene, path: str | os.PathLike[str], *, exposure: float = 0.
     >>> scene = Scene(camera=eye, materials={"clay": Phong(diffuse=0.5)}, objects=[ground], background=0.8)
     >>> with TemporaryDirectory() as folder:
     ...     names = [path.name for path in save_lit(lit_scene(scene, 0.5), f"{folder}/lit.ply")]
-    ...     colors = load_mesh(f"{folder}/lit.ply").colors
-    >>> names, (255 * colors[0]).round().tolist()  # sRGB of 0.4
+    ...     mesh = load_mesh(f"{folder}/lit.ply")
+    >>> names, None if mesh.colors is None else (255 * mesh.colors[0]).round().tolist()  # sRGB of 0.4
     (['lit.ply'], [170.0, 170.0, 170.0])
     """
     target = as_path("path", path)
