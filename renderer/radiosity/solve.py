@@ -78,7 +78,7 @@ class Radiosity:
     irradiance : ndarray of float64, shape (n, 3)
         The power per area that arrives at it.
     residual : float
-        The largest |E + rho H - B|, for the irradiance H.
+        The largest error of E + rho H = B, for the irradiance H.
     bound : float
         No value is farther from that of the exact solution for these view factors. Errors of view factors come on top.
     iterations : int
