@@ -1,9 +1,8 @@
 """Exact laws of studies: each check counts the answers that break one."""
 
-from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,9 +30,9 @@ from validation.meshes import tetrahedron
 from validation.oracle.exact import closest_hits
 from validation.oracle.starts import Surface
 from validation.studies.bodies import FAR, bodies, street, terrain, touching, town
+from validation.studies.checks import Asked, Check, counted, row_of
 
 Floats = NDArray[np.float64]
-Asked = tuple[int, int]
 _SEED = 2045
 # Whole numbers, so that coordinates of whole multiples of 2^-18 are moved exactly: near Munich in UTM, metres.
 UTM = np.array([691_008.0, 5_335_040.0, 519.0])
@@ -44,11 +43,6 @@ def _within(mesh: Mesh) -> Floats:
     a, b, c = mesh.triangles.transpose(1, 0, 2)
     points: Floats = a + (b - a) / 4.0 + (c - a) / 4.0
     return points
-
-
-def _count(same: Any) -> Asked:
-    right = np.asarray(same)
-    return right.size, int((~right).sum())
 
 
 def _bits(octree: Octree, points: Floats, normals: Floats, *, leaving: NDArray[np.int64]) -> Any:
@@ -64,7 +58,7 @@ def moved_to_utm() -> Asked:
         for study in (sky_view_factor, _bits):
             here = study(near, points, normals, leaving=faces)
             there = study(far, points + UTM, normals, leaving=faces)
-            number, bad = _count(here == there)
+            number, bad = counted(here == there)
             asked, wrong = asked + number, wrong + bad
     return asked, wrong
 
@@ -81,7 +75,7 @@ def threads_order_and_company() -> Asked:
         sky_view_factor(octree, points[some], normals[some], leaving=faces[some]) == whole[some],
         [sky_view_factor(octree, points[i], normals[i], leaving=faces[i]) == whole[i] for i in some[:9]],
     ]
-    return _count(np.concatenate(found))
+    return counted(np.concatenate(found))
 
 
 def no_light_through_touching_walls() -> Asked:
@@ -113,7 +107,7 @@ def no_shade_among_faces_of_a_plane() -> Asked:
         points, normals, faces = face_points(turned)
         light = ambient_occlusion(Octree.from_mesh(turned), points, normals, leaving=faces, samples=200)
         found.append(light == 1.0)
-    return _count(np.concatenate(found))
+    return counted(np.concatenate(found))
 
 
 def two_sides_of_a_thin_plate() -> Asked:
@@ -122,14 +116,14 @@ def two_sides_of_a_thin_plate() -> Asked:
     points, normals, faces = face_points(mesh)
     sky = sky_view_factor(Octree.from_mesh(mesh), points, normals, leaving=faces)
     level = normals[:, 2] != 0.0
-    return _count(sky[level] == (normals[level, 2] > 0.0))
+    return counted(sky[level] == (normals[level, 2] > 0.0))
 
 
 def dark_inside_bodies() -> Asked:
     """Points within closed bodies are hidden from all sides, whatever their normals."""
     rng = np.random.default_rng(_SEED)
     ball, points = Octree.from_mesh(icosphere(3)), rng.uniform(-0.5, 0.5, (300, 3))
-    return _count(np.concatenate([
+    return counted(np.concatenate([
         openness(ball, points, samples=300) == 0.0, sky_view_factor(ball, points, rng.normal(size=(300, 3))) == 0.0,
         ambient_occlusion(ball, points, rng.normal(size=(300, 3))) == 0.0,
         occlusion(ball, points, None, fibonacci_sphere(64).directions) == 1.0,
@@ -149,7 +143,7 @@ def hours_behind_walls() -> Asked:
     found = sun_hours(octree, np.stack([x, x, 0 * x], axis=1), [0, 0, 1], suns, hours, leaving=leaving)
     low, high = np.arctan(depth / (1.0 - x)), np.pi - np.arctan(depth / (1.0 + x))
     known = [hours[(angle > a) & (angle < b)].sum() for a, b in zip(low, high, strict=True)]
-    return _count(found == known)
+    return counted(found == known)
 
 
 def weights_and_distances_of_directions() -> Asked:
@@ -165,7 +159,7 @@ def weights_and_distances_of_directions() -> Asked:
         occlusion(octree, points, [0, 0, 1], ways, weights=weights),
     ]
     known = [[5 / 15, 5 / 15], [0.0, 5 / 15], [7 / 15, 7 / 15]]
-    return _count(np.array(found) == known)
+    return counted(np.array(found) == known)
 
 
 def light_through_screens() -> Asked:
@@ -182,7 +176,7 @@ def light_through_screens() -> Asked:
             sun_hours(octree, points, None, suns[:1], transmittance=halves, max_distance=1.75),
         ]
         known += [np.full(2, 7.0 * left), np.full(2, 1.0 - left), np.full(2, 0.25)]
-    return _count(np.array(found) == known)
+    return counted(np.array(found) == known)
 
 
 def faces_that_an_eye_sees() -> Asked:
@@ -215,7 +209,7 @@ def clouds_and_depths() -> Asked:
     starts = np.stack([x.ravel(), y.ravel(), np.full(x.size, 9.0)], axis=1)
     lines = closest_hits(mesh.vertices, mesh.faces, starts, np.tile([0.0, 0.0, -1.0], (x.size, 1)))
     deep = np.array([float(hit.t) if hit else np.inf for hit in lines])
-    return _count(np.concatenate([_near(found, expected), _near(depth.ravel(), deep)]))
+    return counted(np.concatenate([_near(found, expected), _near(depth.ravel(), deep)]))
 
 
 def clouds_from_a_roof() -> Asked:
@@ -240,7 +234,7 @@ def clouds_from_a_roof() -> Asked:
         with np.errstate(invalid="ignore"):
             close = (found == known) | ((known > 0.0) & (np.abs(found - known) <= 1e-9 * known))
         right.append(close & [int(number) in (one.faces or (-1,)) for number, one in zip(faces, law, strict=True)])
-    return _count(np.concatenate(right))
+    return counted(np.concatenate(right))
 
 
 def places_of_a_grid() -> Asked:
@@ -254,7 +248,7 @@ def places_of_a_grid() -> Asked:
             np.save(path, np.concatenate([grid_points.points, grid_points.normals], axis=1))
             read = of_file(octree, path).points
         found.append(study.evaluate(octree, read) == study.evaluate(octree, grid_points))
-    return _count(np.concatenate(found))
+    return counted(np.concatenate(found))
 
 
 def edges_from_both_sides() -> Asked:
@@ -286,7 +280,7 @@ def edges_from_both_sides() -> Asked:
             (octree.visible(points, away) == before.any(axis=1))[outside],
             (octree.visible(away, points) == before.any(axis=1))[outside],
         ]
-    return _count(np.concatenate(right))
+    return counted(np.concatenate(right))
 
 
 def _near(found: Floats, known: Floats) -> NDArray[np.bool_]:
@@ -294,13 +288,6 @@ def _near(found: Floats, known: Floats) -> NDArray[np.bool_]:
     with np.errstate(invalid="ignore"):
         close = np.abs(found - known) <= 4.0 * np.spacing(np.where(np.isfinite(known), known, 1.0))
     return (found == known) | close
-
-
-class Check(NamedTuple):
-    """What must hold, and the public names that it judges."""
-
-    ask: Callable[[], Asked]
-    judged: tuple[str, ...]
 
 
 CHECKS = {
@@ -328,7 +315,4 @@ CHECKS = {
 
 def check(name: str) -> dict[str, Any]:
     """A row: answers asked, and how many are not as they must be."""
-    ask, judged = CHECKS[name]
-    asked, wrong = ask()
-    says = " ".join((ask.__doc__ or "").split())
-    return {"subject": name, "says": says, "asked": asked, "wrong": wrong, "judged": judged}
+    return row_of(name, CHECKS[name])

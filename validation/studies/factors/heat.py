@@ -10,9 +10,9 @@ from renderer.octree import Octree
 from renderer.radiosity import net_heat
 from renderer.studies import view_factors
 from validation.oracle.view_factors.enclosures import heat_of_two
+from validation.studies.checks import Asked, counted
 from validation.studies.factors.round import ball
 
-Asked = tuple[int, int]
 # Of the largest heat: the tolerance of the solution, and the sums of view factors.
 _RELATIVE = 1e-8
 _RTOL = 0.01
@@ -28,7 +28,7 @@ def two_surfaces() -> Asked:
         found = net_heat(factors, shares, kelvin).net
         known = heat_of_two(tuple(factors.areas), shares, kelvin)
         right += [abs(found[0] - known) <= _RELATIVE * abs(known), abs(found[1] + known) <= _RELATIVE * abs(known)]
-    return len(right), right.count(False)
+    return counted(right)
 
 
 def heat_adds_up() -> Asked:
@@ -44,4 +44,4 @@ def heat_adds_up() -> Asked:
             factors = view_factors(Octree.from_mesh(Mesh.concatenate(*parts)), groups, rtol=_RTOL)
         net = net_heat(factors, share, [293.0, 293.0, 293.0, 293.0, 303.0, 291.0, 300.0]).net
         right.append(abs(net.sum()) <= _RELATIVE * np.abs(net).max())
-    return len(right), right.count(False)
+    return counted(right)

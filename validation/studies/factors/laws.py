@@ -1,30 +1,25 @@
 """Exact laws of view factors: each check counts the answers that break one."""
 
 import warnings
-from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from renderer.octree import Octree
 from renderer.studies import view_factors
 from validation.oracle.view_factors.rectangles import Span, parallel
+from validation.studies.checks import Asked, Check, counted, row_of
 from validation.studies.factors.forms import ERRORS, FORMS
 from validation.studies.factors.heat import heat_adds_up, two_surfaces
 from validation.studies.factors.rooms import ROOMS, Plate, Room, of_plates, room_with_column, two_rooms
 
-Asked = tuple[int, int]
 # Sums of some hundred shares, each rounded.
 _SUM = 1e-12
 # Rows that are traced again are balanced in steps, to 1e-9.
 _BALANCED = 1e-8
 # Laws hold for any number of rays.
 _RTOL, _RAYS = 0.05, 4096
-
-
-def _count(same: Any) -> Asked:
-    right = np.asarray(same)
-    return right.size, int((~right).sum())
 
 
 def _found(room: Room, **options: Any) -> Any:
@@ -46,7 +41,7 @@ def _each() -> Iterator[Any]:
 def rows_are_whole() -> Asked:
     """Each row of view factors, with the sky, has the sum 1."""
     sums = [found.matrix.sum(axis=1) + found.sky + found.backs for found in _each()]
-    return _count(np.abs(np.concatenate(sums) - 1.0) <= _SUM)
+    return counted(np.abs(np.concatenate(sums) - 1.0) <= _SUM)
 
 
 def rows_by_rays_are_whole() -> Asked:
@@ -56,13 +51,13 @@ def rows_by_rays_are_whole() -> Asked:
         found = view_factors(Octree.from_mesh(room.mesh), room.groups, form="rays", max_rays=_RAYS)
         sums = found.exchange @ np.ones(len(found.areas)) / found.areas
         right.append(np.abs(sums + found.sky + found.backs - 1.0) <= _BALANCED)
-    return _count(np.concatenate(right))
+    return counted(np.concatenate(right))
 
 
 def what_leaves_comes_back() -> Asked:
     """A_i F_ij equals A_j F_ji, bit for bit."""
     parts = [(found.exchange.toarray(), found.exchange.T.toarray()) for found in _each()]
-    return _count(np.concatenate([(there == back).ravel() for there, back in parts]))
+    return counted(np.concatenate([(there == back).ravel() for there, back in parts]))
 
 
 def shares_are_shares() -> Asked:
@@ -72,20 +67,20 @@ def shares_are_shares() -> Asked:
         shares = [found.matrix.toarray().ravel(), found.sky, found.backs]
         right += [(part >= 0.0) & (part <= 1.0 + _SUM) for part in shares]
         right.append((found.errors.data >= 0.0) & np.isfinite(found.errors.data))
-    return _count(np.concatenate(right))
+    return counted(np.concatenate(right))
 
 
 def planes_do_not_see_themselves() -> Asked:
     """A face, or a surface of faces in one plane, does not see itself."""
     rooms = [build() for build in ROOMS.values()]
     found = [_found(room) for room in rooms] + [_found(rooms[0]._replace(groups=np.arange(len(rooms[0].groups))))]
-    return _count(np.concatenate([part.exchange.diagonal() == 0.0 for part in found]))
+    return counted(np.concatenate([part.exchange.diagonal() == 0.0 for part in found]))
 
 
 def closed_rooms_have_no_sky() -> Asked:
     """Nothing leaves a closed room, nor ends on a back."""
     found = [_found(build()) for name, build in ROOMS.items() if name.startswith("room")]
-    return _count(np.concatenate([part.sky == 0.0 for part in found] + [part.backs == 0.0 for part in found]))
+    return counted(np.concatenate([part.sky == 0.0 for part in found] + [part.backs == 0.0 for part in found]))
 
 
 def backs_do_not_receive() -> Asked:
@@ -97,7 +92,7 @@ def backs_do_not_receive() -> Asked:
         found = _found(room, rtol=0.01, max_rays=1 << 16)
     known, rays = parallel(1.0, 1.0, 1.0), int(found.rays[0])
     close = abs(float(found.backs[0]) - known) <= ERRORS * np.sqrt(known * (1.0 - known) / rays)
-    return _count([found.exchange.nnz == 0, close, found.backs[1] == 0.0, found.sky[1] == 1.0, len(said) == 1])
+    return counted([found.exchange.nnz == 0, close, found.backs[1] == 0.0, found.sky[1] == 1.0, len(said) == 1])
 
 
 def a_column_only_hides() -> Asked:
@@ -108,7 +103,7 @@ def a_column_only_hides() -> Asked:
     rows, places = ([room.planes.index(plane) for plane in walls] for room in rooms)
     before, after = free.matrix.toarray()[np.ix_(rows, rows)], hidden.matrix.toarray()[np.ix_(places, places)]
     errors = np.hypot(free.errors.toarray()[np.ix_(rows, rows)], hidden.errors.toarray()[np.ix_(places, places)])
-    return _count(after <= before + ERRORS * errors + _SUM)
+    return counted(after <= before + ERRORS * errors + _SUM)
 
 
 def walls_between_rooms_hide_all() -> Asked:
@@ -117,7 +112,7 @@ def walls_between_rooms_hide_all() -> Asked:
     faces = room._replace(groups=np.arange(len(room.groups)))
     left = room.mesh.triangles[:, :, 0].max(axis=1) <= 1.0
     exchange = _found(faces).exchange.toarray()
-    return _count(exchange[np.ix_(left, ~left)] == 0.0)
+    return counted(exchange[np.ix_(left, ~left)] == 0.0)
 
 
 def threads_change_nothing() -> Asked:
@@ -128,7 +123,7 @@ def threads_change_nothing() -> Asked:
         for a, b in ((one.exchange, three.exchange), (one.errors, three.errors)):
             right.append((a.toarray() == b.toarray()).ravel())
         right += [one.sky == three.sky, one.rays == three.rays]
-    return _count(np.concatenate(right))
+    return counted(np.concatenate(right))
 
 
 def faces_add_up_to_surfaces() -> Asked:
@@ -144,14 +139,7 @@ def faces_add_up_to_surfaces() -> Asked:
         # Entries that no ray has hit state no error.
         unseen = 15.0 * whole.areas[:, None] / max(int(whole.rays.min()), 256)
         right.append(np.abs(sums - whole.exchange.toarray()) <= ERRORS * errors + unseen)
-    return _count(np.concatenate([part.ravel() for part in right]))
-
-
-class Check(NamedTuple):
-    """What must hold, and the public names that it judges."""
-
-    ask: Callable[[], Asked]
-    judged: tuple[str, ...]
+    return counted(np.concatenate([part.ravel() for part in right]))
 
 
 CHECKS = {
@@ -173,7 +161,4 @@ CHECKS = {
 
 def check(name: str) -> dict[str, Any]:
     """A row: answers asked, and how many are not as they must be."""
-    ask, judged = CHECKS[name]
-    asked, wrong = ask()
-    says = " ".join((ask.__doc__ or "").split())
-    return {"subject": name, "says": says, "asked": asked, "wrong": wrong, "judged": judged}
+    return row_of(name, CHECKS[name])
