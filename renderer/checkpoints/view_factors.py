@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from renderer.arguments.types import ArrayLike
 from renderer.checkpoints.folder import RunFolder
 from renderer.checkpoints.parts import digest_of
+from renderer.numerics.compressed import firsts_of
 from renderer.queryable import Queries
 from renderer.rayscene.scene import RayScene
 from renderer.studies.factors.assemble import warn_of_backs
@@ -114,7 +115,7 @@ def trace_part(
     """``trace_rows`` of rows, in ascending order, with what is known of these alone."""
     lengths = np.zeros(tracing.surfaces.number, np.int64)
     lengths[rows] = np.diff(first)
-    known = Known(np.concatenate([[0], np.cumsum(lengths)]), targets)
+    known = Known(firsts_of(lengths), targets)
     return trace_rows(tracing, rows, known, update)
 
 
@@ -158,7 +159,7 @@ def folder_for(tracing: Tracing, folder: Path) -> RunFolder:
 def _of_rows(known: Known, rows: Integers) -> Known:
     """What is known of some rows, as rows that follow each other."""
     lengths = np.diff(known.first)[rows]
-    first = np.concatenate([[0], np.cumsum(lengths)])
+    first = firsts_of(lengths)
     entries = np.arange(first[-1]) + np.repeat(known.first[rows] - first[:-1], lengths)
     return Known(first, known.targets[entries])
 

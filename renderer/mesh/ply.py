@@ -20,6 +20,7 @@ from renderer.mesh.mesh import Float64Array, Mesh
 from renderer.mesh.polygons import triangulate
 from renderer.mesh.reading import Reading
 from renderer.mesh.texture import Texture
+from renderer.numerics.compressed import firsts_of
 
 _TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
@@ -357,7 +358,7 @@ def _gathered(
     byte_order: _ByteOrder,
 ) -> _Column:
     """A column whose values lie at uneven places of ``content``."""
-    firsts = np.concatenate([[0], np.cumsum(lengths)])
+    firsts = firsts_of(lengths)
     size = property_.stored.itemsize
     places = np.repeat(starts - firsts[:-1] * size, lengths) + np.arange(firsts[-1]) * size
     scattered = np.frombuffer(content, np.uint8)[places[:, None] + np.arange(size)]
@@ -421,7 +422,7 @@ def _polygons(polygons: _Column, positions: Float64Array, reading: Reading) -> N
     if (lengths < 3).any():
         reading.no_polygon()
         corners, rows = corners[np.repeat(lengths >= 3, lengths)], rows[lengths >= 3]
-    cut = triangulate(positions, corners, np.concatenate([[0], np.cumsum(lengths[rows])]))
+    cut = triangulate(positions, corners, firsts_of(lengths[rows]))
     reading.cut(rows[cut.wrong].tolist(), "the row of the face")
     triangles: NDArray[np.int64] = corners[cut.places]
     return triangles

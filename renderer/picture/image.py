@@ -61,9 +61,13 @@ def srgb(linear: ArrayLike) -> NDArray[np.uint8]:
     return code + (x >= steps.take(code))
 
 
+def srgb_of_linear(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values from 0 to 1 of linear values from 0 to 1, not rounded to codes."""
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1.0 / 2.4) - 0.055)
+
+
 def _encoded(linear: ArrayLike) -> NDArray[np.uint8]:
-    x = np.clip(np.asarray(linear, np.float64), 0.0, 1.0)
-    encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1.0 / 2.4) - 0.055)
+    encoded = srgb_of_linear(np.clip(np.asarray(linear, np.float64), 0.0, 1.0))
     # rule: rounded-encoding
     return (encoded * 255.0 + 0.5).astype(np.uint8)
 

@@ -12,6 +12,7 @@ from renderer.arguments.types import ArrayLike
 from renderer.errors import expect, expect_known
 from renderer.mesh.crease import Split
 from renderer.mesh.mesh import Mesh, give_materials, give_parts
+from renderer.picture.image import srgb_of_linear
 from renderer.radiosity.surfaces import reject_rows
 from renderer.studies.places import face_areas
 from renderer.trace.batch import whole_numbers
@@ -90,7 +91,7 @@ def vertex_colors(
     group, vertices, faces = _split(mesh, crease, owner)
     with np.errstate(over="ignore"):
         linear = np.clip(_means(mesh, group, rows)[group[vertices]] * np.exp2(float(stops)), 0.0, 1.0)
-    colors = _encoded(linear) if space == "srgb" else linear
+    colors = srgb_of_linear(linear) if space == "srgb" else linear
     used = mesh.faces.ravel()[vertices]
     normals, texcoords = (None if a is None else a[used] for a in (mesh.normals, mesh.texcoords))
     made = Mesh(mesh.vertices[used], faces, normals, colors, texcoords, mesh.name)
@@ -136,8 +137,3 @@ def _means(mesh: Mesh, group: Ints, rows: Floats) -> Floats:
     total = np.bincount(group, weights, count)
     shares = weights / total[group]
     return np.stack([np.bincount(group, shares * np.repeat(column, 3), count) for column in rows.T], axis=1)
-
-
-def _encoded(linear: Floats) -> Floats:
-    """Linear values from 0 to 1 as sRGB (IEC 61966-2-1)."""
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)

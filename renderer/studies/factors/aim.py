@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from renderer.distance.on_surface import SurfacePoints
 from renderer.jit.decorators import inlined, kernel
 from renderer.mesh.mesh import Mesh
-from renderer.numerics.mixing import mixed
+from renderer.numerics.mixing import mixed, share_of
 from renderer.numerics.simd import load, offset, pointer, store
 from renderer.numerics.vec3 import add, put3, row3, scale, three
 from renderer.studies.factors.surfaces import Surfaces
@@ -96,7 +96,7 @@ def turns_of(rows: NDArray[np.int64]) -> NDArray[np.float64]:
     """By what rays of some rows differ from those of others, (rows, TURN): they depend on the row alone."""
     own = np.arange(1, 4, dtype=np.uint64)
     numbers = (rows.astype(np.uint64)[:, None] * np.uint64(3) + own).astype(np.uint64)
-    share, across, turn = ((mixed(numbers * WEYL) >> np.uint64(11)).astype(np.float64) * 2.0**-53).T
+    share, across, turn = share_of(mixed(numbers * WEYL)).T
     return np.stack([share, across, np.cos(2.0 * np.pi * turn), np.sin(2.0 * np.pi * turn)], axis=1)
 
 
@@ -107,7 +107,7 @@ def rays_from(begin: int, count: int) -> NDArray[np.float64]:
     numbers = np.arange(1, REPLICATES * _DIMENSIONS + 1, dtype=np.uint64) * WEYL
     shifts = mixed(numbers).reshape(REPLICATES, _DIMENSIONS)[rays % np.uint64(REPLICATES)]
     bits = shifts + (rays // np.uint64(REPLICATES))[:, None] * _STEPS
-    share, across, u, v = ((bits >> np.uint64(11)).astype(np.float64) * 2.0**-53).T
+    share, across, u, v = share_of(bits).T
     turn = 2.0 * np.pi * v
     # rule: cosine-of-exchange
     level, height = np.sqrt(u), np.sqrt(1.0 - u)

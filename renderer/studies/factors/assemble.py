@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.numerics.compressed import firsts_of
 from renderer.studies.factors.balance import Exchanges, balanced, rows_of
 from renderer.studies.factors.known import KnownPairs
 from renderer.studies.factors.result import ViewFactors, csr_array
@@ -71,7 +72,7 @@ def _together(pairs: KnownPairs, counted: _Counted) -> tuple[csr_array, Floats, 
     columns = np.concatenate([pairs.columns, values.indices])
     order = np.lexsort((columns, rows)) if len(pairs.rows) else slice(None)
     entries = np.concatenate([pairs.values, values.data])[order]
-    first = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=values.shape[0]))])
+    first = firsts_of(np.bincount(rows, minlength=values.shape[0]))
     upper = type(values)((entries, columns[order], first), shape=values.shape)
     freedom, variance = np.concatenate([exact, counted.freedom]), np.concatenate([exact, counted.variance])
     return upper, freedom[order], variance[order]

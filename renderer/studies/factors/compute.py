@@ -12,6 +12,7 @@ from renderer.arguments.arrays import flag_argument, real_argument
 from renderer.arguments.counts import count_argument
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
+from renderer.numerics.compressed import firsts_of
 from renderer.queryable import Queries
 from renderer.rayscene.scene import RayScene
 from renderer.studies.factors.aim import REPLICATES, senders_of
@@ -119,8 +120,8 @@ def view_factors(
     >>> factors.sky.round(4)
     array([0.2   , 0.2   , 0.2   , 0.2   , 0.1998])
     """
-    free = isinstance(form, str) and form == "rays"
-    expect(free or (isinstance(form, str) and form == "matrix"), "form", "'matrix' or 'rays'", repr(form))
+    expect(isinstance(form, str) and form in ("matrix", "rays"), "form", "'matrix' or 'rays'", repr(form))
+    free = form == "rays"
     tracing = checked_tracing(
         octree, groups, sides=sides, transmittance=transmittance, rtol=rtol, max_rays=max_rays, threads=threads,
         progress=progress, least=REPLICATES if free else FIRST_RAYS,
@@ -185,4 +186,4 @@ def _spread(hits: RowHits, rows: Integers, number: int) -> RowHits:
     """The hits of some rows as those of all; the others have none."""
     lengths, rays = np.zeros((2, number), np.int64)
     lengths[rows], rays[rows] = np.diff(hits.first), hits.rays
-    return hits._replace(first=np.concatenate([[0], np.cumsum(lengths)]), rays=rays)
+    return hits._replace(first=firsts_of(lengths), rays=rays)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
-from renderer.queryable import Queries
+from renderer.queryable import Built, Queries
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -32,8 +33,20 @@ class Twins(NamedTuple):
     covered: NDArray[np.bool_]
 
 
+# Those of each octree, with the mesh and tree that they were found in: calls for points look for them once.
+_FOUND: WeakKeyDictionary[Queries, tuple[Built, Twins]] = WeakKeyDictionary()
+
+
 def twins_of(octree: Queries) -> Twins:
     """What lies on the faces of a mesh."""
+    built = octree._built
+    last = _FOUND.get(octree)
+    if last is None or last[0] is not built:
+        last = _FOUND[octree] = built, _search(octree)
+    return last[1]
+
+
+def _search(octree: Queries) -> Twins:
     mesh, normals = octree.mesh, octree.mesh.face_normals()
     twin = np.full(len(mesh.faces), -1)
     sound = np.flatnonzero(normals.any(axis=1))

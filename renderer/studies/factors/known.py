@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.numerics.compressed import firsts_of
 from renderer.studies.factors.rows import Known, RowHits, Tracing
 from renderer.studies.factors.work import Work
 
@@ -45,7 +46,7 @@ class KnownPairs(NamedTuple):
         rows = np.concatenate([self.rows, self.columns[beside]])
         targets = np.concatenate([self.columns, self.rows[beside]])
         order = np.argsort(rows * number + targets, kind="stable")
-        first = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=number))])
+        first = firsts_of(np.bincount(rows, minlength=number))
         return Known(first, targets[order])
 
 
@@ -89,11 +90,12 @@ def known_of(tracing: Tracing, worth: Worth, work: Work) -> KnownPairs:
     once = ~own[pair] | (first < second)
     pair, first, second = pair[once], first[once], second[once]
     faces = np.stack([np.minimum(first, second), np.maximum(first, second)], axis=1)
-    two_sided = bool(surfaces.both.all())
-    sound = ((surfaces.transmittance == 0.0) & (surfaces.both == two_sided))[faces].all(axis=1)
-    exchange, known = work.pairs(tracing, faces)
-    covered = surfaces.covered[faces].any(axis=1)
-    unknown = np.bincount(pair, ~(known & sound | covered), len(sizes)) > 0
-    values: Floats = np.where(own, 2.0, 1.0) * np.bincount(pair, np.where(covered, 0.0, exchange), len(sizes))
+    sound = ((surfaces.transmittance == 0.0) & (surfaces.both == surfaces.two_sided))[faces].all(axis=1)
+    # A face that is covered exchanges nothing.
+    known = surfaces.covered[faces].any(axis=1)
+    tried, exchange = np.flatnonzero(sound & ~known), np.zeros(len(faces))
+    exchange[tried], known[tried] = work.pairs(tracing, faces[tried])
+    unknown = np.bincount(pair, ~known, len(sizes)) > 0
+    values: Floats = np.where(own, 2.0, 1.0) * np.bincount(pair, exchange, len(sizes))
     kept = ~unknown
     return KnownPairs(worth.rows[kept], worth.columns[kept], values[kept])

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.numerics.mixing import mixed
+from renderer.numerics.compressed import firsts_of
+from renderer.numerics.mixing import mixed, share_of
 from renderer.ordering.morton import order_along_curve
 from renderer.queryable import Built
 from renderer.results.hits import Hits
@@ -144,9 +145,9 @@ def _tally(keys: Integers, rows: Integers, known: Known, rtol: float, last: bool
     errors, lengths = np.empty(count * rays), np.empty(count, np.int64)
     unfinished = np.empty(count, np.bool_)
     spans = [known.targets[known.first[row] : known.first[row + 1]] for row in rows]
-    first = np.concatenate([[0], np.cumsum([len(span) for span in spans])])
+    first = firsts_of([len(span) for span in spans])
     written = tally_rows(keys, first, np.concatenate(spans), rtol, last, targets, counts, errors, lengths, unfinished)
-    ends = np.concatenate([[0], np.cumsum(lengths[~unfinished])])
+    ends = firsts_of(lengths[~unfinished])
     targets, counts, errors = (column[:written].copy() for column in (targets, counts, errors))
     return RowHits(ends, targets, counts, errors, np.full(len(ends) - 1, rays)), unfinished
 
@@ -161,7 +162,7 @@ def in_order(parts: list[tuple[Integers, RowHits]]) -> RowHits:
     begins = begins + np.repeat(np.cumsum(sizes) - sizes, [len(own) for own, _ in parts])
     lengths = np.concatenate([np.diff(part.first) for _, part in parts])
     begins, lengths = begins[order], lengths[order]
-    first = np.concatenate([[0], np.cumsum(lengths)])
+    first = firsts_of(lengths)
     entries = np.arange(first[-1]) + np.repeat(begins - first[:-1], lengths)
     targets, counts, errors = (np.concatenate([part[k] for _, part in parts])[entries] for k in (1, 2, 3))
     return RowHits(first, targets, counts, errors, np.concatenate([part.rays for _, part in parts])[order])
@@ -226,9 +227,8 @@ def _pass_through(tracing: Tracing, hits: Hits, directions: Floats, rows: Intege
     rays = np.flatnonzero(hits.face >= 0)
     while len(rays):
         numbers[rays] = mixed(numbers[rays] + WEYL)
-        chance = (numbers[rays] >> np.uint64(11)).astype(np.float64) * 2.0**-53
         # rule: transmitted-share
-        rays = rays[chance < tracing.surfaces.transmittance[hits.face[rays]]]
+        rays = rays[share_of(numbers[rays]) < tracing.surfaces.transmittance[hits.face[rays]]]
         if len(rays) == 0:
             return
         here = hits[rays]

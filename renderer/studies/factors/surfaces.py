@@ -44,6 +44,11 @@ class Surfaces(NamedTuple):
         """How many surfaces there are."""
         return len(self.areas)
 
+    @property
+    def two_sided(self) -> bool:
+        """Whether all faces send from both sides."""
+        return bool(self.both.all())
+
 
 def check_surfaces(octree: Queries, groups: ArrayLike | None, sides: str, transmittance: ArrayLike | None) -> Surfaces:
     """The arguments of ``view_factors``, checked. Raises ``ValueError`` naming argument and row."""

@@ -45,5 +45,4 @@ def face_pairs(tracing: Tracing, faces: Integers, update: Update = None) -> tupl
 
     Of both sides if all faces send from both.
     """
-    both = bool(tracing.surfaces.both.all())
-    return exact_pairs(tracing.built, faces, tracing.threads, update, both=both)
+    return exact_pairs(tracing.built, faces, tracing.threads, update, both=tracing.surfaces.two_sided)
