@@ -169,6 +169,28 @@ def test_both_sides_of_a_plate_are_seen_each_from_its_side(first):
     assert (off <= 5.0 * np.hypot(thin.errors.toarray(), thick.errors.toarray()) + 1e-5).all()
 
 
+def test_an_underside_exchanges_nothing_with_what_lies_below_the_floor():
+    """A block on a floor, and a plate below that faces up: the underside is covered, whichever way its pairs are found.
+
+    After a refit that lifts the block off the floor, its underside sees the floor.
+    """
+    plates = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    up = np.array([[0, 1, 2], [0, 2, 3]])
+    block, floor = box((0.25, 0.25, 0.0), (0.75, 0.75, 0.5)), (4.0 * plates - [1.5, 1.5, 0.0], up)
+    vertices, faces = joined(floor, (plates - np.eye(3)[2], up), (block.vertices, block.faces))
+    bottom = np.flatnonzero(block.face_normals()[:, 2] < -0.5)
+    groups = np.concatenate([[0, 0, 1, 1], np.where(np.isin(np.arange(12), bottom), 3, 2)])
+    octree = Octree(vertices, faces)
+    with pytest.warns(UserWarning, match="see backs"):
+        found = view_factors(octree, groups)
+    assert found.exchange.toarray()[3].tolist() == [0.0] * 4 and found.backs[3] == 1.0
+    moved = vertices + np.where(np.arange(len(vertices)) >= 8, 0.5, 0.0)[:, None] * np.eye(3)[2]
+    octree.refit(moved)
+    with pytest.warns(UserWarning, match="see backs"):
+        lifted = view_factors(octree, groups)
+    assert lifted.backs[3] == 0.0 and lifted.matrix[3, 0] > 0.5
+
+
 def test_errors_of_like_surfaces_do_not_add_up():
     """Of 40 equal pairs of plates, far from each other, a block between them: the mean errs less than each."""
     plates = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
