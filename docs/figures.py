@@ -1,6 +1,6 @@
 """Write the figures of the pages and the chart from ``docs/figures.json``, so that none is older than another.
 
-    python docs/figures.py                                    # README.md, docs/measured*.md, docs/drawings/chart.svg
+    python docs/figures.py                                    # PAGES, docs/drawings/chart.svg
     python docs/figures.py --record reports/metrics.json      # first take the figures of a run of make validate
     python docs/figures.py --record reports/benchmark.json    # or of make bench, on the machine that ran it
 
@@ -23,7 +23,9 @@ from record import Record, distilled, read, write  # noqa: E402
 
 from validation.benchmark.page.heat import MEAN_FACES, geometric_mean  # noqa: E402
 
-PAGES = tuple(ROOT / name for name in ("README.md", "docs/measured.md", "docs/measured-avx512.md"))
+PAGES = tuple(
+    ROOT / name for name in ("README.md", "docs/measured.md", "docs/measured-avx512.md", "docs/performance.md")
+)
 CHART = ROOT / "docs" / "drawings" / "chart.svg"
 MARK = re.compile(r"(<!-- figures: (\w+)(?: ([\w -]+?))? -->)(.*?)(<!-- /figures -->)", re.DOTALL)
 PEERS = {"embree": "embreex", "open3d": "Open3D", "mitsuba_llvm": "Mitsuba"}

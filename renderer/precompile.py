@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from renderer.arguments.split import SPLIT, Split
 from renderer.diagnostics.face_phong import face_colors
 from renderer.diagnostics.ray_path import ray_path
 from renderer.diagnostics.tree_boxes import visited
@@ -60,8 +61,8 @@ class Part(NamedTuple):
     call: Callable[[], object]
 
 
-def _build() -> None:
-    Octree.from_mesh(icosphere(_SUBDIVISIONS))
+def _build(split: Split = SPLIT) -> None:
+    Octree.from_mesh(icosphere(_SUBDIVISIONS), split=split)
 
 
 def _refit() -> None:
@@ -72,15 +73,17 @@ def _refit() -> None:
 def _trace(count: int) -> None:
     # Hits of rays that start on a face are uncertain.
     for height in (1.0, 0.0):
-        rays = np.tile([0.1, 0.1, height], (count, 1))
-        Octree.from_mesh(_TRIANGLE).closest_hit(rays, [0.0, 0.0, -1.0])
+        rays, octree = np.tile([0.1, 0.1, height], (count, 1)), Octree.from_mesh(_TRIANGLE)
+        for query in (octree.closest_hit, octree.any_hit):
+            query(rays, [0.0, 0.0, -1.0])
 
 
 def _leave() -> None:
     octree, starts = Octree.from_mesh(_TRIANGLE), np.tile([0.1, 0.1, 0.0], (20, 1))
     for accelerator in (octree, BruteForce.from_mesh(_TRIANGLE)):
-        accelerator.any_hit(starts[:1], [0.0, 0.0, 1.0], leaving=0)
-        accelerator.any_hit(starts, [0.0, 0.0, 1.0], leaving=0)
+        for query in (accelerator.closest_hit, accelerator.any_hit):
+            query(starts[:1], [0.0, 0.0, 1.0], leaving=0)
+            query(starts, [0.0, 0.0, 1.0], leaving=0)
     octree.visible([0.1, 0.1, 0.0], [0.1, 0.1, 1.0], leaving=0)
 
 
@@ -136,7 +139,9 @@ def _exchange() -> None:
 
 
 def _search() -> None:
-    BruteForce.from_mesh(_TRIANGLE).closest_hit([[0.1, 0.1, 1.0]], [[0.0, 0.0, -1.0]])
+    brute = BruteForce.from_mesh(_TRIANGLE)
+    for query in (brute.closest_hit, brute.any_hit):
+        query([[0.1, 0.1, 1.0]], [[0.0, 0.0, -1.0]])
 
 
 def _render(material: Material = _GLASS) -> None:
@@ -152,6 +157,7 @@ def _view() -> None:
 
 _QUERIES = (
     Part("build", _build),
+    Part("build by middles", partial(_build, "midpoint")),
     Part("refit", _refit),
     Part("a few rays", partial(_trace, 1)),
     Part("many rays", partial(_trace, 20)),

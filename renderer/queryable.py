@@ -274,7 +274,7 @@ class Queries:
     ) -> Steps:
         """Return how many nodes and triangles the search for each ray's closest hit tests, for heat maps.
 
-        The counts are those of a ray that travels alone and visits the nearest boxes first. Rays of one direction are
+        The counts are those of a ray that travels alone and comes to near boxes first. Rays of one direction are
         traced together: they test more, at less cost.
 
         Parameters
@@ -310,7 +310,8 @@ class Queries:
     ) -> tuple[RayBatch, tuple[int, ...]]:
         """The arguments of a query, checked, and moved off the faces that the rays leave; and their dimensions."""
         if leaving is None:
-            expect(side is None, "side", "None without leaving", repr(side)[:40])
+            if side is not None:
+                expect(False, "side", "None without leaving", repr(side)[:40])
             return check_rays(origins, directions, t_min, t_max)
         rays, shape = check_rays(origins, directions, t_min, t_max, shapes_of_starts(leaving, side))
         left = check_leaving(leaving, side, shape, len(built.mesh.faces))

@@ -18,7 +18,7 @@ from renderer.octree import BruteForce, Octree
 from renderer.trace.batch import check_rays
 from renderer.trace.best import NO_FACE, FaceHit, hit_on
 from renderer.trace.intersect import Ray, box_limit, enter_boxes, largest_of, make_shear, make_slabs, round_down
-from renderer.trace.layout import CHILDREN, NODE_WORDS, Tree, root_box
+from renderer.trace.layout import ANY_ORDER, CHILDREN, NODE_WORDS, ORDERS, Tree, root_box
 from renderer.trace.leaf import nearest_carefully
 from renderer.trace.trees import tree_pointers
 from renderer.trace.walk import blocks_of
@@ -71,10 +71,10 @@ def _root_box(tree: Tree) -> Boxes:
 def visited(octree: Octree | BruteForce, origin: ArrayLike, direction: ArrayLike, t_max: float = np.inf) -> list[Visit]:
     """The nodes and leaves that the closest-hit search of one ray visits, in order.
 
-    ``origin`` and ``direction`` (3,), ``t_max`` in units of |direction|. The nearest octant comes first; one whose
-    entry is beyond the best hit so far is not visited. The tests are the kernel's own, so these are the visits of a ray
-    traced alone; a packet may visit more. A ray that misses the root visits nothing. Raises ``ValueError`` naming the
-    argument.
+    ``origin`` and ``direction`` (3,), ``t_max`` in units of |direction|. The octants of a node come in its order for
+    the ray; one whose entry is beyond the best hit so far is not visited. The tests are the kernel's own, so these are
+    the visits of a ray traced alone; a packet may visit more. A ray that misses the root visits nothing. Raises
+    ``ValueError`` naming the argument.
     """
     rays, _ = check_rays(np.asarray(origin)[None], np.asarray(direction)[None], 0.0, t_max)
     octree.any_hit(rays.origins, rays.directions)  # raises for rays out of bounds
@@ -110,23 +110,22 @@ def _above(tree: Tree, box: NDArray[np.float64]) -> Tree:
     words[:CHILDREN].reshape(3, 2, 8)[:, 1] = -np.inf
     words[:CHILDREN].reshape(3, 2, 8)[:, :, 0] = box.reshape(2, 3).T
     words[CHILDREN:] = 0.0
+    words.view(np.int32)[ORDERS : ORDERS + 8] = ANY_ORDER
     return replace(tree, nodes=words)
 
 
 def _met_octants(tree: Tree, node: int, level: int, ray: Ray, t_max: float) -> list[_Waiting]:
-    """The octants of ``node`` that the ray enters up to ``t_max``, nearest last; at equal distance in the kernel's
-    order.
-    """
+    """The octants of ``node`` that the ray enters up to ``t_max``, in the node's order, nearest last."""
     # A copy, which can be written, as the node of ``_above`` can: the kernel is compiled for such arrays alone.
     words, distances = tree.nodes[node * NODE_WORDS : (node + 1) * NODE_WORDS].copy(), np.empty(8, np.float32)
     bits = _meet(words, ray, t_max, distances)
-    boxes, children = words[:CHILDREN].reshape(3, 2, 8).astype(np.float64), words.view(np.int32)[CHILDREN:]
-    met = [
-        _Waiting(float(distances[i]), int(children[i]), level + 1, boxes[:, :, i].T.ravel())
-        for i in range(8)
+    boxes, links = words[:CHILDREN].reshape(3, 2, 8).astype(np.float64), words.view(np.int32)
+    order = int(links[ORDERS + sum(int(np.signbit(d)) << k for k, d in enumerate((ray.dx, ray.dy, ray.dz)))])
+    return [
+        _Waiting(float(distances[i]), int(links[CHILDREN + i]), level + 1, boxes[:, :, i].T.ravel())
+        for i in (order >> 3 * k & 7 for k in range(8))
         if bits >> i & 1
     ]
-    return sorted(met, key=lambda o: (o.distance, o.child & 0xFFFFFFFF), reverse=True)
 
 
 @kernel

@@ -561,16 +561,6 @@ def count_bits(typingctx, bits):
 
 
 @intrinsic
-def float_bits(typingctx, value):
-    """The bits of a float32 as a non-negative int64; for values >= 0 they sort like the values."""
-
-    def codegen(context, builder, sig, args):
-        return builder.zext(builder.bitcast(args[0], ir.IntType(32)), ir.IntType(64))
-
-    return types.int64(types.float32), codegen
-
-
-@intrinsic
 def bits_float(typingctx, bits):
     """The float32 with the bits in the low half of an int64."""
 
@@ -578,12 +568,6 @@ def bits_float(typingctx, bits):
         return builder.bitcast(builder.trunc(args[0], ir.IntType(32)), ir.FloatType())
 
     return types.float32(types.int64), codegen
-
-
-# A bitonic network that sorts eight values (Batcher 1968): in each row lane i is compared with lane i ^ step, and keeps
-# the larger where both or neither of i & step and i & run are 0. Networks of fewer comparisons take as many rows, and
-# more time to move lanes: here all moves but one stay within four lanes.
-_NETWORK = ((1, 2), (2, 4), (1, 4), (4, 8), (2, 8), (1, 8))
 
 
 def _permuted(builder: Any, vector: Any, places: Any) -> Any:
@@ -599,38 +583,34 @@ def _permuted(builder: Any, vector: Any, places: Any) -> Any:
     return builder.bitcast(builder.call(fence, [builder.bitcast(found, floats)]), vector.type)
 
 
-@intrinsic
-def farthest_first(typingctx, mask, distances, links, index):
-    """Eight int64 in falling order: the bits of a float32 distance, not negative, above the int32 in its place from
-    ``index`` on of the ``pointer`` ``links``. Lanes outside the mask come last, with any values.
-
-    The last three bits of a distance are cleared; during the sort they have the lane's number. So no two are equal, and
-    only 32-bit words are compared: AVX2 has minima and maxima of these, not of 64-bit words.
-    """
-
-    def codegen(context, builder, sig, args):
-        word = ir.VectorType(ir.IntType(32), 8)
-        link = _load(builder, _pointer(context, builder, sig.args[2], args[2], args[3], word), sig.args[2])
-        key = builder.and_(builder.bitcast(args[1], word), ir.Constant(word, [0x7FFFFFF8] * 8))
-        key = builder.select(args[0], key, ir.Constant(word, [-(1 << 31)] * 8))
-        key = builder.or_(key, ir.Constant(word, list(range(8))))
-        for step, run in _NETWORK:
-            order = ir.Constant(word, [i ^ step for i in range(8)])
-            least = [(i & step == 0) != (i & run == 0) for i in range(8)]
-            other = builder.shuffle_vector(key, key, order)
-            larger = builder.icmp_signed(">", key, other)
-            most, fewest = builder.select(larger, key, other), builder.select(larger, other, key)
-            key = builder.shuffle_vector(most, fewest, ir.Constant(word, [i + 8 * least[i] for i in range(8)]))
-        link = _permuted(builder, link, builder.and_(key, ir.Constant(word, [7] * 8)))
-        key = builder.and_(key, ir.Constant(word, [~7] * 8))
-        pairs = ir.Constant(ir.VectorType(ir.IntType(32), 16), [i // 2 + 8 * (i % 2) for i in range(16)])
-        return builder.bitcast(builder.shuffle_vector(link, key, pairs), _llvm(I64X8))
-
-    return I64X8(mask, distances, links, types.intp), codegen
-
-
 # For each mask of eight lanes, those that are set and then the others.
 _SET_FIRST = [sorted(range(8), key=lambda lane: mask >> lane & 1 == 0) for mask in range(256)]
+
+
+def _first_set(builder: Any, mask: Any) -> Any:
+    """The numbers of eight lanes, those that are set in the mask first."""
+    byte, word, wide = (ir.IntType(bits) for bits in (8, 32, 64))
+    row = ir.VectorType(byte, 8)
+    table = ir.Constant(ir.ArrayType(row, 256), [ir.Constant(row, order) for order in _SET_FIRST])
+    at = builder.zext(builder.bitcast(mask, byte), wide)
+    order = builder.load(builder.gep(cgutils.global_constant(builder, "set_first", table), [wide(0), at]))
+    return builder.zext(order, ir.VectorType(word, 8))
+
+
+def _links(context: Any, builder: Any, pointer_type: Any, links: Any, index: Any) -> Any:
+    """Eight int32 from ``index`` on of a ``pointer``; of None the numbers from ``index`` on."""
+    word = ir.VectorType(ir.IntType(32), 8)
+    if pointer_type == types.none:
+        return builder.add(_spread_word(builder, builder.trunc(index, word.element)), ir.Constant(word, list(range(8))))
+    at = _pointer(context, builder, pointer_type, links, index, word)
+    return _load(builder, at, pointer_type)
+
+
+def _spread_word(builder: Any, value: Any) -> Any:
+    """An int32 in all of eight lanes."""
+    word = ir.VectorType(value.type, 8)
+    one = builder.insert_element(ir.Constant(word, ir.Undefined), value, value.type(0))
+    return builder.shuffle_vector(one, one, ir.Constant(word, [0] * 8))
 
 
 @intrinsic
@@ -638,13 +618,30 @@ def set_first(typingctx, mask, links, index):
     """Eight int64: the int32 from ``index`` on of the ``pointer`` ``links`` as low words, those in the mask first."""
 
     def codegen(context, builder, sig, args):
-        byte, word, wide = (ir.IntType(bits) for bits in (8, 32, 64))
-        row = ir.VectorType(byte, 8)
-        table = ir.Constant(ir.ArrayType(row, 256), [ir.Constant(row, order) for order in _SET_FIRST])
-        at = builder.zext(builder.bitcast(args[0], byte), wide)
-        order = builder.load(builder.gep(cgutils.global_constant(builder, "set_first", table), [wide(0), at]))
-        eight = ir.VectorType(word, 8)
-        link = _load(builder, _pointer(context, builder, sig.args[1], args[1], args[2], eight), sig.args[1])
-        return builder.zext(_permuted(builder, link, builder.zext(order, eight)), _llvm(I64X8))
+        link = _links(context, builder, sig.args[1], args[1], args[2])
+        return builder.zext(_permuted(builder, link, _first_set(builder, args[0])), _llvm(I64X8))
 
     return I64X8(mask, links, types.intp), codegen
+
+
+@intrinsic
+def set_in_order(typingctx, mask, distances, links, index, order):
+    """``set_first`` in an order, an int32 with the lanes' numbers in three bits each, the first in the lowest.
+
+    The high words are the bits of the float32 distances, of which those in the mask are not NaN. If ``links`` is None,
+    the low words are the numbers from ``index`` on.
+    """
+
+    def codegen(context, builder, sig, args):
+        word = ir.VectorType(ir.IntType(32), 8)
+        lanes = builder.lshr(_spread_word(builder, args[4]), ir.Constant(word, [3 * k for k in range(8)]))
+        lanes, unset = builder.and_(lanes, ir.Constant(word, [7] * 8)), ir.Constant(word, [-1] * 8)
+        far = builder.select(args[0], builder.bitcast(args[1], word), unset)
+        far = _permuted(builder, far, lanes)
+        first = _first_set(builder, builder.icmp_signed("!=", far, unset))
+        link = _links(context, builder, sig.args[2], args[2], args[3])
+        link, far = _permuted(builder, link, _permuted(builder, lanes, first)), _permuted(builder, far, first)
+        pairs = ir.Constant(ir.VectorType(ir.IntType(32), 16), [i // 2 + 8 * (i % 2) for i in range(16)])
+        return builder.bitcast(builder.shuffle_vector(link, far, pairs), _llvm(I64X8))
+
+    return I64X8(mask, distances, links, types.intp, types.int32), codegen

@@ -42,12 +42,14 @@ from renderer.trace.instances import (
     VERTICES,
 )
 from renderer.trace.layout import (
+    ANY_ORDER,
     BLOCK_FACES,
     BLOCK_WORDS,
     CHILDREN,
     LEAF_BITS,
     MASK_BITS,
     NODE_WORDS,
+    ORDERS,
     TREE_WORDS,
     UNUSED,
     Tree,
@@ -69,7 +71,7 @@ _MOST_BLOCKS = (1 << NUMBER_BITS) // BLOCK_WORDS
 _ENCLOSED = 1e-6
 # Faces that are looked for together: a tenth of a millisecond.
 _CHUNK = 4096
-_RULE = Rule(SPLITS["midpoint"], 1, 32)
+_RULE = Rule(SPLITS["sah"], 1, 32)
 
 
 def _new_id() -> str:
@@ -192,7 +194,8 @@ def _top(
         nodes[:] = 0.0
         rows = nodes[:CHILDREN].reshape(3, 2, 8)
         rows[:, 0], rows[:, 1] = np.inf, -np.inf
-        nodes.view(np.int32)[CHILDREN : CHILDREN + 8] = UNUSED
+        links = nodes.view(np.int32)
+        links[CHILDREN : CHILDREN + 8], links[ORDERS : ORDERS + 8] = UNUSED, ANY_ORDER
         return nodes, 1
     order = new_faces(len(shown))
     box_all(instances, words, shown, order.boxes, order.numbers)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 @dataclass(eq=False, slots=True)
 class Steps:
-    """The steps of each ray's search for its closest hit, if it travels alone and visits the nearest boxes first.
+    """The steps of each ray's search for its closest hit, if it travels alone and comes to near boxes first.
 
     Attributes
     ----------

@@ -139,7 +139,7 @@ def _pass_through(tree, scene, scratch, k, rule):
     shadows, found = scratch.shadows, scratch.passed
     row, rays = 3 * k, 0
     while True:
-        trace_rays(tree, _shadow_rays(scene, shadows, scratch.zero, k), found, 1, scratch.trace, np.bool_(False))
+        trace_rays(tree, _shadow_rays(scene, shadows, scratch.zero, k), found, 1, scratch.trace, None)
         if load(found.face, 0) < 0:
             return False, rays
         d = three(shadows, _DIRECTION + row)
@@ -188,7 +188,7 @@ def behind_holes(tree, scene, scratch, d, spot, rule):
     store(shadows, _T_MAX, np.inf)
     while spot.face >= 0 and panes < MOST_HOLES and not scene.looks.is_there(scene, spot):
         _go_on(scene, shadows, 0, spot, rule)
-        trace_rays(tree, _shadow_rays(scene, shadows, scratch.zero, 0), found, 1, scratch.trace, np.bool_(False))
+        trace_rays(tree, _shadow_rays(scene, shadows, scratch.zero, 0), found, 1, scratch.trace, None)
         t, spot = t + load(found.t, 0), Spot(load(found.face, 0), load(found.u, 0), load(found.v, 0))
         panes += 1
     return t, spot

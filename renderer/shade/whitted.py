@@ -394,7 +394,7 @@ def meet(tree, scene, settings, bundle, scratch):
     # Those of camera rays are all alike: they start on no surface.
     starts = StartPointers(bundle.starts, ROW if depth_of(bundle) > 0 else 0, scene.vertices, scene.faces)
     rays = RayPointers(bundle.origins, bundle.directions, scratch.zero, scratch.infinity, 3, 3, 0, 0, 1.0, starts)
-    trace_rays(tree, rays, scratch.found, count_of(bundle), scratch.trace, np.bool_(False))
+    trace_rays(tree, rays, scratch.found, count_of(bundle), scratch.trace, None)
     # rule: holes-for-rays
     if scene.looks.has_holes(scene):
         _go_through_holes(tree, scene, settings, bundle, scratch)

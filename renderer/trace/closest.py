@@ -1,7 +1,7 @@
 """Closest and any hits of a batch of rays: in chunks, on threads."""
 
 import threading
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,11 +37,14 @@ def closest_hits(tree: Tree, rays: RayBatch, mesh: Mesh, threads: int) -> Hits:
     count = rays.number
     # Arrays of their own take less time to make than rows of one, which few rays notice.
     t, u, v = np.empty(count), np.empty(count), np.empty(count)
-    face, side, pile = np.empty(count, _INT), np.empty(count, _INT), np.empty(count, _INT)
+    face, side = np.empty(count, _INT), np.empty(count, _INT)
+    # Rays that start on no surface come upon the face that they hit.
+    pile = None if rays.starts is NO_STARTS else np.empty(count, _INT)
+    unread = side if pile is None else pile
     if count <= FEW and 0 < tree.depth <= FEW_DEPTH:
-        _trace_few(tree, rays, t, face, u, v, side, pile)
+        _trace_few(tree, rays, t, face, u, v, side, unread)
     else:
-        _run(tree, rays, count, HitArrays(t, face, u, v, side, pile, _NO_HIT), threads, any_hit=False)
+        _run(tree, rays, count, HitArrays(t, face, u, v, side, unread, _NO_HIT), threads, any_hit=None)
     return Hits(t, face, u, v, mesh, None, side, pile)
 
 
@@ -82,49 +85,46 @@ def rays_against_blocks(tree: Tree) -> int:
     return max(1, _BLOCK_TESTS * BLOCK_FACES // max(1, len(tree.faces)))
 
 
-def _run(tree: Tree, rays: RayBatch, count: int, found: HitArrays, threads: int, any_hit: bool) -> None:
+def _run(tree: Tree, rays: RayBatch, count: int, found: HitArrays, threads: int, any_hit: bool | None) -> None:
     size = min(CHUNK, max(_LEAST_CHUNK, count // (16 * threads)))
     if not tree.has_nodes:
         size = min(size, rays_against_blocks(tree))
-    bad = list[int]()
+    bad: list[int] = []
 
     def trace(begin: int, end: int) -> Iterator[None]:
         # Only chunks after a bad ray are left out, so the first bad ray is always found.
-        if bad and bad[0] < begin:
-            return
-        row = yield from find_range(tree, rays, found, any_hit, begin, end)
-        if row >= 0:
-            bad.append(row)
+        if not bad or begin < bad[0]:
+            yield from find_range(tree, rays, found, any_hit, begin, end, bad)
 
-    if count <= size:
-        for _ in trace(0, count):
-            pass
-    else:
+    if count > size:
         for_chunks(trace, count, size, threads)
+    else:
+        for _ in find_range(tree, rays, found, any_hit, 0, count, bad):
+            pass
     if bad:
         reject(rays, min(bad), tree.scale)
 
 
 def find_range(
-    tree: Tree, rays: RayBatch, found: HitArrays, any_hit: bool, begin: int, end: int
-) -> Generator[None, None, int]:
+    tree: Tree, rays: RayBatch, found: HitArrays, any_hit: bool | None, begin: int, end: int, bad: list[int]
+) -> Iterator[None]:
     """Trace up to CHUNK rays begin:end of a batch on the caller's thread, and yield where this can be stopped.
 
-    Returns the row of the first ray out of range, or -1.
+    If a ray is out of range, append the row of the first to ``bad``.
     """
-    origins, directions, t_min, t_max, starts = rays
-    own = ALONE if starts is NO_STARTS else starts
-    arrays = (tree.descriptor, origins, directions, t_min, t_max, own, *found, any_hit)
+    own = ALONE if rays.starts is NO_STARTS else rays.starts
+    arrays = (tree.descriptor, *rays[:4], own, *found, any_hit)
     scratch, row = _take_scratch(tree.depth), -1
     if tree.has_nodes:
-        reached, following, waiting = begin, 0, 0
+        chunk, reached, following, waiting = entry_of(trace_chunk), begin, 0, 0
         while row < 0 and (reached < end or following < waiting):
-            reached, following, waiting, row = trace_chunk(*arrays, scratch, reached, following, waiting, end)
+            reached, following, waiting, row = chunk(*arrays, scratch, reached, following, waiting, end)
             yield
     else:
         row = search_chunk(*arrays, scratch.holders, begin, end)
     _local.scratch = scratch
-    return int(row)
+    if row >= 0:
+        bad.append(int(row))
 
 
 class _Local(threading.local):

@@ -38,7 +38,7 @@ from renderer.numerics.simd import (
 )
 from renderer.numerics.vec3 import row3, scale
 from renderer.trace.best import side_of
-from renderer.trace.intersect import Slabs, enter_boxes, largest_of, make_slab, make_slabs, room_of
+from renderer.trace.intersect import Slabs, enter_in_order, largest_of, make_slab, make_slabs, room_of
 from renderer.trace.layout import (
     BLOCK_WORDS,
     BLOCKS,
@@ -52,7 +52,7 @@ from renderer.trace.layout import (
     TREE_WORDS,
     WIDE,
 )
-from renderer.trace.packet import child_of, enter_beam, make_beam, meet_octant, middle_entry, most_of, push_sorted
+from renderer.trace.packet import child_of, enter_beam, make_beam, meet_octant, most_of, push_nearest_last
 from renderer.trace.ray_lanes import (
     CHILD,
     LIMIT,
@@ -146,10 +146,8 @@ def _trace_packet(tree, rays, stack, any_hit):
     beam, floats, nodes, listed = make_beam(rays), rays.floats, tree.nodes, local_words()
     limit, top, node, count = most_of(floats, LIMIT), np.int64(0), np.int64(0), np.int64(0)
     while node >= 0:
-        base = node * NODE_WORDS
-        t0, bits = enter_beam(nodes, base, beam, limit)
-        if bits != 0:
-            top = push_sorted(node, bits, t0, middle_entry(nodes, base, beam, rays, t0), stack, top)
+        t0, meets = enter_beam(nodes, node * NODE_WORDS, beam, limit)
+        top = push_nearest_last(tree, node, meets, t0, beam.order, stack, top)
         node = np.int64(-1)
         while node < 0 and top > 0:
             top -= 1
@@ -161,7 +159,9 @@ def _trace_packet(tree, rays, stack, any_hit):
                 store(listed, count, entry)
                 count += 1
             elif count == _SHARED:
-                return push_sorted(0, np.int64(0xFF), splat8(np.float32(-np.inf)), splat8(limit), stack, 0), np.int64(0)
+                for octant in range(8):
+                    store(stack, octant, octant)
+                return 8, np.int64(0)
     for k in range(count):
         store(stack, k, load(listed, count - 1 - k))
     return count, np.int64(0)
@@ -419,12 +419,13 @@ def _extent(nodes, base, middle, axis):
 def _enter(tree, node, single, upper):
     number, local, lower = node >> NUMBER_BITS, node & _NUMBER, single.lower
     if number == 0:
-        return enter_boxes(tree.nodes, local * NODE_WORDS, single.slabs, lower, upper)
+        return enter_in_order(tree.nodes, tree.links, local * NODE_WORDS, single.slabs, lower, upper)
     matrix, words = _instance(tree, number)
-    object_ = _object(words)
+    at = _nodes(_object(words))
+    nodes, links, base = float32_pointer(at), int32_pointer(at), local * NODE_WORDS
     slabs = slabs_within(matrix, words, single.ray, single.largest)
-    distances, bits = enter_boxes(float32_pointer(_nodes(object_)), local * NODE_WORDS, slabs, lower, upper)
-    return distances, bits if _meets(words, number, single.ray.mask, single.ray.ignored) else bits & 0
+    distances, bits, order = enter_in_order(nodes, links, base, slabs, lower, upper)
+    return distances, bits if _meets(words, number, single.ray.mask, single.ray.ignored) else bits & 0, order
 
 
 @inlined

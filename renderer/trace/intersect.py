@@ -27,7 +27,7 @@ from renderer.numerics.simd import (
 )
 from renderer.numerics.vec3 import largest_component
 from renderer.trace.best import FaceHit
-from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, MASK_BITS
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, MASK_BITS, ORDERS
 
 # (1 + 2 gamma(3)) in float32, rounded up: the far side of a slab after one subtraction, one product and one rounded
 # reciprocal, against a near side that erred the other way (Ize, Robust BVH Ray Traversal, JCGT 2:2, 2013, sec. 3).
@@ -206,6 +206,26 @@ def make_slabs(ray, largest):
     return Slabs(
         nx, ny, nz, fx, fy, fz, nox, noy, noz, fox, foy, foz, nix, niy, niz, fix, fiy, fiz
     )  # fmt: skip
+
+
+@inlined
+def order_of_octants(near_x, near_y, near_z):
+    """The word of a node that has the order of its octants for a ray with these near rows."""
+    # A near row is 16 times its axis, and 8 more where the direction is negative.
+    return ORDERS + ((near_x + 2 * (near_y - 16) + 4 * (near_z - 32)) >> 3)
+
+
+@inlined
+def order_for(links, base, slabs):
+    """The order of the octants of the node at word ``base`` for a ray, int32."""
+    return load(links, base + order_of_octants(slabs.near_x, slabs.near_y, slabs.near_z))
+
+
+@inlined
+def enter_in_order(nodes, links, base, slabs, lower, upper):
+    """``enter_boxes``, and the order of the octants."""
+    t0, bits = enter_boxes(nodes, base, slabs, lower, upper)
+    return t0, bits, order_for(links, base, slabs)
 
 
 @inlined

@@ -13,11 +13,15 @@ T = TypeVar("T", bound=np.generic)
 CACHE_LINE = 64
 
 # A node is NODE_WORDS 32-bit words, four cache lines. Words 0-47 are six rows of eight float32, one value per octant:
-# lower x, upper x, lower y, upper y, lower z, upper z. Words CHILDREN to CHILDREN + 7 are its children as int32 (the
-# same memory seen through ``links``); the last eight are unused. An empty octant has lower = +inf and upper = -inf,
-# which no ray enters (but see UNUSED), and the link UNUSED.
+# lower x, upper x, lower y, upper y, lower z, upper z. Words CHILDREN to CHILDREN + 7 are its children, words ORDERS to
+# ORDERS + 7 orders of them, as int32 (the same memory seen through ``links``). An empty octant has lower = +inf and
+# upper = -inf, which no ray enters (but see UNUSED), and the link UNUSED.
 NODE_WORDS = 64
 CHILDREN = 48
+# An order has the octants' numbers as octal digits, that of the farthest last, for rays whose directions have the signs
+# of its place: 1, 2 and 4 are set in it where x, y and z are negative. See ``tree.order``.
+ORDERS = 56
+ANY_ORDER = 0o76543210
 
 # A child >= 0 is a node. A child < 0 is a leaf: ~child holds its first block and, in the low three bits, its number
 # of blocks less one.

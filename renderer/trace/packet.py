@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.kinds import of_none
 from renderer.numerics.simd import (
     count_bits,
-    extract,
     load,
     load8,
     lowest_bit,
@@ -23,10 +23,11 @@ from renderer.numerics.simd import (
     reduce_max,
     reduce_min,
     select,
+    set_in_order,
     splat8,
     store,
 )
-from renderer.trace.intersect import FAR_PADDING
+from renderer.trace.intersect import FAR_PADDING, order_of_octants
 from renderer.trace.layout import CHILDREN, NODE_WORDS
 from renderer.trace.ray_lanes import (
     BLOCK_ROW,
@@ -38,17 +39,19 @@ from renderer.trace.ray_lanes import (
     LOWER,
     NEAR_INVERSE,
     NEAR_ORIGIN,
+    NEAR_ROW,
     SLOPE_U,
     SLOPE_V,
     WIDTH,
     nearest_in_leaf,
 )
-from renderer.trace.stack_entry import distance_of, make_entry, octant_of
+from renderer.trace.stack_entry import distance_of, octant_of
 
 # A beam's slopes widen by 2^-18 of their size, four times the padding of a single ray's boxes, which covers that and
-# the five roundings between the two forms of the test; and by what a slope loses below the normal float32.
+# the five roundings between the two forms of the test; and by more than a slope loses below the normal float32. That is
+# itself far above them: processors take a hundred cycles for each product with a number below.
 _WIDER = np.float32(2.0**-18)
-_LEAST_SLOPE = np.float32(2.0**-140)
+_LEAST_SLOPE = np.float32(2.0**-60)
 # A packet gives up after this many octants, and its rays go on as lanes. Most packets of a dense picture end after 40;
 # where faces are smaller than the distance of neighbouring rays, they share the upper levels only. Of 16 to 512, 48 was
 # within 5 % of the best on meshes of 1e5, 1e6 and 5e6 faces.
@@ -96,7 +99,7 @@ class Beam(NamedTuple):
     The beam enters a box that lies within these lines somewhere between its entry and its exit, and likewise along v.
 
     Rows of a node, then ranges of float32: near and far origins along w, origins along u and v, slopes along u and v;
-    the sign, and the least distance that counts.
+    the sign, the least distance that counts, and the word of a node that has the order of its octants.
     """
 
     near_row: Any
@@ -115,6 +118,7 @@ class Beam(NamedTuple):
     most_v: Any
     sign: Any
     lower: Any
+    order: Any
 
 
 @inlined
@@ -169,12 +173,22 @@ def make_beam(rays):
         most_v + (abs(most_v) * _WIDER + _LEAST_SLOPE),
         np.float32(1.0) if forward else np.float32(-1.0),
         _least(floats, LOWER),
+        _order_of(rays.integers),
     )
 
 
 @inlined
+def _order_of(integers):
+    """``order_of_octants`` of a ray in the middle."""
+    row = NEAR_ROW + WIDTH // 2
+    return order_of_octants(load(integers, row), load(integers, row + WIDTH), load(integers, row + 2 * WIDTH))
+
+
+@inlined
 def enter_beam(nodes, base, beam, limit):
-    """The bits of the octants of the node at word ``base`` that the beam enters, and their distances along its axis."""
+    """The distances along its axis at which the beam enters the octants of the node at word ``base``, and the mask of
+    those that it enters.
+    """
     sign, lower, upper = splat8(beam.sign), splat8(beam.lower), splat8(limit)
     n = (load8(nodes, base + beam.near_row) - splat8(beam.near_origin)) * sign
     t0 = select(n > lower, n, lower)
@@ -189,7 +203,7 @@ def enter_beam(nodes, base, beam, limit):
     meets = meets & (load8(nodes, base + beam.row_v) - splat8(beam.high_v) <= select(a > b, a, b))
     a, b = splat8(beam.least_v) * t0, splat8(beam.least_v) * t1
     meets = meets & (load8(nodes, base + beam.row_v + 8) - splat8(beam.low_v) >= select(a < b, a, b))
-    return t0, movemask(meets)
+    return t0, meets
 
 
 @inlined
@@ -209,41 +223,21 @@ def meet_box(nodes, at, floats, half):
 
 
 @inlined
-def middle_entry(nodes, base, beam, rays, t0):
-    """The distances at which a ray in the middle enters the octants; they sort them."""
-    floats, middle = rays.floats, WIDTH // 2
-    for row in (beam.row_u, beam.row_v):
-        axis = row >> 4
-        inverse = load(floats, NEAR_INVERSE + axis * WIDTH + middle)
-        near = row + (8 if inverse < 0.0 else 0)
-        n = (load8(nodes, base + near) - splat8(load(floats, NEAR_ORIGIN + axis * WIDTH + middle))) * splat8(inverse)
-        t0 = select(n > t0, n, t0)
-    return t0
-
-
-@inlined
-def push_sorted(node, bits, t0, key, stack, top):
-    """Push the octants in ``bits`` of a node, the one with the least key last. An entry has t0 above the octant's
-    number.
-
-    An octant's place is the number of octants behind it, so no branch depends on the keys. NaN counts as -inf;
-    comparisons with NaN are false and would leave places unwritten.
+def push_nearest_last(tree, node, meets, t0, order, stack, top):
+    """Push the octants of a node in ``meets``, in the order at the word ``order`` of nodes; an entry has t0 above the
+    octant's number. Returns the new top.
     """
-    key = select(key > splat8(np.float32(-np.inf)), key, splat8(np.float32(-np.inf)))
-    for i in range(8):
-        k = splat8(extract(key, i))
-        before, after = movemask(key >= k) & ((1 << i) - 1), movemask(key > k) & (0xFF << (i + 1))
-        place = count_bits((before | after) & bits) if (bits >> i) & 1 else 8
-        store(stack, top + place, make_entry(extract(t0, i), node * 8 + i))
-    return top + count_bits(bits)
+    order = load(tree.links, node * NODE_WORDS + order)
+    store(stack, top, set_in_order(meets, t0, None, node * 8, order))
+    return top + count_bits(movemask(meets))
 
 
 @inlined
-def _push_all(node, bits, t0, stack, top):
+def _push_unsorted(tree, node, meets, t0, order, stack, top):
+    bits = movemask(meets)
     while bits != 0:
-        i = lowest_bit(bits)
+        store(stack, top, node * 8 + lowest_bit(bits))
         bits &= bits - 1
-        store(stack, top, make_entry(extract(t0, i), node * 8 + i))
         top += 1
     return top
 
@@ -276,21 +270,18 @@ def meet_octant(nodes, rays, at):
 def trace_packet(tree, rays, stack, any_hit):
     """Search for hits of sixteen prepared rays with one dominant axis and sign; the results stay in ``rays``.
 
-    With ``any_hit`` a ray ends at its first hit, and nothing is sorted. Returns the number of octants left on the stack
-    (0 unless the packet gave up) and the bits of the rays with hits to resolve. ``stack`` has ``walk.stack_size``
-    entries.
+    With ``any_hit`` a ray ends at its first hit, and octants come in any order. Returns the number of octants left on
+    the stack (0 unless the packet gave up) and the bits of the rays with hits to resolve. ``stack`` has
+    ``walk.stack_size`` entries.
     """
     beam, floats, nodes = make_beam(rays), rays.floats, tree.nodes
     limit, unresolved, top, node, left = most_of(floats, LIMIT), np.int64(0), np.int64(0), np.int64(0), BUDGET
     while True:
         # Push the octants of the node that the beam meets.
-        base = node * NODE_WORDS
-        t0, bits = enter_beam(nodes, base, beam, limit)
-        if any_hit:
-            # rule: packet-stack
-            top = _push_all(node, bits, t0, stack, top)
-        elif bits != 0:
-            top = push_sorted(node, bits, t0, middle_entry(nodes, base, beam, rays, t0), stack, top)
+        t0, meets = enter_beam(nodes, node * NODE_WORDS, beam, limit)
+        push = of_none(any_hit, push_nearest_last, _push_unsorted)
+        # rule: packet-stack
+        top = push(tree, node, meets, t0, beam.order, stack, top)
         # Take octants off the stack and test their leaves, until one leads to a node.
         while True:
             if left == 0:
@@ -321,7 +312,7 @@ def test_leaf(tree, rays, meeting, leaf, any_hit):
         meeting &= meeting - 1
         hit, must_resolve = nearest_in_leaf(tree, rays, r, leaf)
         unresolved |= np.int64(must_resolve) << r
-        if any_hit and hit:
+        if any_hit is not None and hit:
             # A limit that no box lies within: the ray meets no further one.
             store(rays.floats, LIMIT + r, np.float32(-np.inf))
             store(rays.integers, CHILD + r, leaf)

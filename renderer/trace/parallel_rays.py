@@ -21,6 +21,7 @@ from renderer.numerics.simd import (
     lowest_bit,
     maximum,
     minimum,
+    movemask,
     offset,
     pointer,
     prefetch,
@@ -148,7 +149,7 @@ def _beam_between(beam, low, high):
     near, far = (high[0], low[0]) if beam.sign > 0.0 else (low[0], high[0])
     return Beam(
         beam.near_row, beam.far_row, beam.row_u, beam.row_v, near, far, low[1], high[1], low[2], high[2],
-        beam.least_u, beam.most_u, beam.least_v, beam.most_v, beam.sign, beam.lower,
+        beam.least_u, beam.most_u, beam.least_v, beam.most_v, beam.sign, beam.lower, beam.order,
     )  # fmt: skip
 
 
@@ -212,7 +213,7 @@ def _list_leaves(tree, beam, limit, parallel, top):
         top -= 1
         entered += 1
         base = load(parallel.waiting, top) * NODE_WORDS
-        _, bits = enter_beam(tree.nodes, base, beam, limit)
+        bits = movemask(enter_beam(tree.nodes, base, beam, limit)[1])
         while bits != 0:
             octant = base + lowest_bit(bits)
             bits &= bits - 1
@@ -236,7 +237,7 @@ def _test_list(tree, prepared, parallel, listed, beam):
     beam, floats, unresolved = _beam_of_sixteen(prepared.floats, beam), prepared.floats, np.int64(0)
     limit = load(floats, LIMIT)
     for base in range(0, (listed + 7) // 8 * NODE_WORDS, NODE_WORDS):
-        _, bits = enter_beam(parallel.nodes, base, beam, limit)
+        bits = movemask(enter_beam(parallel.nodes, base, beam, limit)[1])
         while bits != 0:
             octant = base + lowest_bit(bits)
             bits &= bits - 1

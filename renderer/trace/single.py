@@ -1,6 +1,6 @@
 """Rays traced one by one: those of small batches, and those with uncertain hits."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,11 +11,11 @@ from renderer.trace.best import NO_FACE, Best, no_hit
 from renderer.trace.intersect import largest_of, make_shear
 from renderer.trace.leaf import nearest_carefully, nearest_in_blocks
 from renderer.trace.rays import first_bad_ray, ray_at, write_hit
-from renderer.trace.single_ray import Found, enter_counted, enter_node, prepare_single
+from renderer.trace.single_ray import Found, SingleRay, enter_counted, prepare_single, push_entered
 from renderer.trace.starts.record import PILE
 from renderer.trace.starts.search import is_near_start, search_from, t_from
 from renderer.trace.trees import call_pointers
-from renderer.trace.walk import stack_size, walk
+from renderer.trace.walk import always, stack_size, walk_nearest_first
 
 # What ``trace_few`` returns where a hit is uncertain.
 UNRESOLVED = -2
@@ -27,18 +27,25 @@ FEW_DEPTH = (LOCAL_WORDS - stack_size(0)) // 7
 def search_singly(tree, ray, t_max, stack):
     """The closest hit of one ray, with every uncertain hit resolved, as ``Found``.
 
-    The octants of a node are visited from the last to the first, not by distance. That suits few rays and compiles much
-    faster than packets and streams.
+    It compiles much faster than packets and streams.
     """
     # rule: first-limit
     best = no_hit(t_max)
-    return walk(tree, stack, prepare_single(ray), Found(best, np.int64(0)), enter_counted, _visit)
+    query = _Alone(prepare_single(ray), stack)
+    return walk_nearest_first(tree, stack, query, Found(best, np.int64(0)), always, enter_counted, _visit)
+
+
+class _Alone(NamedTuple):
+    """A ray, and the stack of its walk."""
+
+    single: SingleRay
+    stack: Any
 
 
 @inlined
-def _visit(tree, single, first, count, found):
+def _visit(tree, query, first, count, found):
     # rule: blocks-of-leaf
-    best = nearest_carefully(tree, first, count, single.ray, single.shear, found.best)
+    best = nearest_carefully(tree, first, count, query.single.ray, query.single.shear, found.best)
     return Found(best, found.steps + count), False
 
 
@@ -104,12 +111,13 @@ class _Certain(NamedTuple):
 
 
 @inlined
-def _enter_certainly(tree, single, node, found):
-    return found, enter_node(tree, node, single, found.best.t)[1]
+def _enter_certainly(tree, query, node, found, top):
+    return found, push_entered(tree, query.single, node, found.best.t, query.stack, top)
 
 
 @inlined
-def _visit_certainly(tree, single, first, count, found):
+def _visit_certainly(tree, query, first, count, found):
+    single = query.single
     best, unresolved = nearest_in_blocks(tree, first, count, single.ray.t_min, single.shear, found.best)
     return _Certain(best, unresolved), unresolved
 
@@ -131,7 +139,8 @@ def trace_few(descriptor, origins, directions, t_min, t_max, starts, t, face, u,
     for i in range(count):
         ray, limit = ray_at(source, i)
         single, nothing = prepare_single(ray), _Certain(no_hit(limit), False)
-        best, unresolved = walk(tree, stack, single, nothing, _enter_certainly, _visit_certainly)
+        query = _Alone(single, stack)
+        best, unresolved = walk_nearest_first(tree, stack, query, nothing, always, _enter_certainly, _visit_certainly)
         # rule: uncertain-of-few
         if unresolved:
             return UNRESOLVED

@@ -10,13 +10,14 @@ from renderer.trace.intersect import (
     Shear,
     Slabs,
     box_limit,
-    enter_boxes,
+    enter_in_order,
     largest_of,
     make_shear,
     make_slabs,
     round_down,
 )
 from renderer.trace.layout import NODE_WORDS
+from renderer.trace.walk import push_in_order
 
 
 class SingleRay(NamedTuple):
@@ -49,18 +50,27 @@ def prepare_single(ray):
 
 @inlined
 def enter_node(tree, node, single, t_max):
-    """The entry distances of a node's octants, and the bits of those that a ray enters up to ``t_max``."""
+    """The entry distances of a node's octants, the bits of those that a ray enters up to ``t_max``, and their order."""
     return tree.ways.enter(tree, node, single, splat8(box_limit(t_max, single.largest)))
 
 
 @inlined
 def enter_node_of_tree(tree, node, single, upper):
     """``enter_node`` of a mesh, up to the distance ``upper``."""
-    return enter_boxes(tree.nodes, node * NODE_WORDS, single.slabs, single.lower, upper)
+    return enter_in_order(tree.nodes, tree.links, node * NODE_WORDS, single.slabs, single.lower, upper)
 
 
 @inlined
-def enter_counted(tree, single, node, found):
-    """``enter_node`` up to the best hit so far, for ``walk``; the node counts as a step."""
-    _, bits = enter_node(tree, node, single, found.best.t)
-    return Found(found.best, found.steps + 1), bits
+def enter_counted(tree, query, node, found, top):
+    """Push what the ``single`` ray of a query enters up to its best hit onto the query's ``stack``, for
+    ``walk_nearest_first``; the node counts as a step.
+    """
+    top = push_entered(tree, query.single, node, found.best.t, query.stack, top)
+    return Found(found.best, found.steps + 1), top
+
+
+@inlined
+def push_entered(tree, single, node, t_max, stack, top):
+    """Push the octants that a ray enters up to ``t_max``, the nearest last. Returns the new top."""
+    _, bits, order = enter_node(tree, node, single, t_max)
+    return push_in_order(tree, node, bits, order, stack, top)

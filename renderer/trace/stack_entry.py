@@ -3,15 +3,9 @@
 import numpy as np
 
 from renderer.jit.decorators import inlined
-from renderer.numerics.simd import bits_float, float_bits
+from renderer.numerics.simd import bits_float
 
 _LOW_WORD = 0xFFFFFFFF
-
-
-@inlined
-def make_entry(distance, octant):
-    """The entry of a float32 distance and the number of an octant."""
-    return (float_bits(distance) << 32) | octant
 
 
 @inlined
@@ -35,10 +29,4 @@ def child_of_entry(entry):
 @inlined
 def with_child(entry, child):
     """The entry with a child in place of its number."""
-    return ((entry >> 32) << 32) | order_of(child)
-
-
-@inlined
-def order_of(child):
-    """A child as entries of one distance compare it: nodes before leaves."""
-    return child & _LOW_WORD
+    return ((entry >> 32) << 32) | child & _LOW_WORD

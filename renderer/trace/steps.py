@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.simd import load, lowest_bit, offset, pointer, store
+from renderer.numerics.simd import load, offset, pointer, store
 from renderer.results.steps import Steps
 from renderer.system.threads import for_chunks
 from renderer.trace.batch import CHUNK, RayBatch, reject
@@ -16,7 +16,6 @@ from renderer.trace.layout import BLOCK_FACES, Tree
 from renderer.trace.leaf import nearest_carefully
 from renderer.trace.rays import batch_pointers, first_bad_ray, ray_at
 from renderer.trace.single_ray import SingleRay, enter_node, prepare_single
-from renderer.trace.stack_entry import order_of
 from renderer.trace.trees import tree_pointers
 from renderer.trace.walk import child_in, stack_size, walk_nearest_first
 
@@ -111,9 +110,9 @@ def _reaches(query, k, found):
 
 @inlined
 def _enter(tree, query, node, found, top):
-    t0, bits = enter_node(tree, node, query.single, found.best.t)
+    t0, bits, order = enter_node(tree, node, query.single, found.best.t)
     store(query.waiting.distances, 0, t0)
-    top = _push_sorted(tree, node, bits, query.waiting, top)
+    top = _push_in_order(tree, node, bits, np.int64(order), query.waiting, top)
     return TraversalCounts(found.best, found.nodes + 1, found.triangles), top
 
 
@@ -132,24 +131,12 @@ def _faces_in(tree, first, count):
 
 
 @inlined
-def _push_sorted(tree, node, bits, waiting, top):
+def _push_in_order(tree, node, bits, order, waiting, top):
     """``push_children`` with the nearest on top, as in streams."""
-    stack, near, first = waiting.stack, waiting.near, top
-    while bits != 0:
-        i = lowest_bit(bits)
-        bits &= bits - 1
-        distance, child, k = load(waiting.distances, i), child_in(tree, node, i), top
-        while k > first and _precedes(load(near, k - 1), load(stack, k - 1), distance, child):
-            store(near, k, load(near, k - 1))
-            store(stack, k, load(stack, k - 1))
-            k -= 1
-        store(near, k, distance)
-        store(stack, k, child)
-        top += 1
+    for k in range(8):
+        i = order >> 3 * k & 7
+        if bits >> i & 1 != 0:
+            store(waiting.near, top, load(waiting.distances, i))
+            store(waiting.stack, top, child_in(tree, node, i))
+            top += 1
     return top
-
-
-@inlined
-def _precedes(distance, child, other_distance, other):
-    """Whether a box is nearer than another; at equal distance nodes come before leaves."""
-    return distance < other_distance or (distance == other_distance and order_of(child) < order_of(other))

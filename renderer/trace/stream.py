@@ -13,7 +13,6 @@ import numpy as np
 from renderer.jit.decorators import inlined
 from renderer.numerics.simd import (
     count_bits,
-    farthest_first,
     load,
     lowest_bit,
     minimum,
@@ -21,12 +20,13 @@ from renderer.numerics.simd import (
     offset,
     prefetch,
     set_first,
+    set_in_order,
     splat4,
     splat8,
     store,
 )
 from renderer.trace.best import NO_FACE, Best
-from renderer.trace.intersect import box_limit, face_in, meet_boxes, meet_planes, see_triangles
+from renderer.trace.intersect import box_limit, face_in, meet_boxes, meet_planes, order_for, see_triangles
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CACHE_LINE, CHILDREN, MAX_LEAF_BLOCKS, NODE_WORDS
 from renderer.trace.ray_lanes import (
     CHILD,
@@ -195,15 +195,15 @@ def wait_octant(prepared, lanes, r, entry, child):
 
 
 @inlined
-def nearest_last(meets, distances, links, index):
+def nearest_last(meets, distances, links, base, slabs):
     """Entries of the octants that a ray enters, the nearest last; others may follow."""
-    return farthest_first(meets, distances, links, index)
+    return set_in_order(meets, distances, links, base + CHILDREN, order_for(links, base, slabs))
 
 
 @inlined
-def unsorted(meets, distances, links, index):
+def unsorted(meets, distances, links, base, slabs):
     """``nearest_last`` for queries that need not come to near octants first: in any order, all with the distance 0."""
-    return set_first(meets, links, index)
+    return set_first(meets, links, base + CHILDREN)
 
 
 @inlined
@@ -216,8 +216,9 @@ def meet_nodes(tree, rays, lanes, count, order):
         r = load(lanes.at_node, k)
         top, (nodes, links, base) = load(rays.integers, TOP + r), tree.ways.node_of(tree, rays, r)
         lower, upper = splat8(load(rays.floats, LOWER + r)), splat8(load(rays.floats, LIMIT + r))
-        t0, meets = meet_boxes(nodes, base, slabs_of(rays, r), lower, upper)
-        store(lanes.stacks, top, order(meets, t0, links, base + CHILDREN))
+        slabs = slabs_of(rays, r)
+        t0, meets = meet_boxes(nodes, base, slabs, lower, upper)
+        store(lanes.stacks, top, order(meets, t0, links, base, slabs))
         store(rays.integers, TOP + r, top + count_bits(movemask(meets)))
 
 

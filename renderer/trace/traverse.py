@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.kinds import of_none
 from renderer.numerics.simd import load, lowest_bit, minimum, offset, pointer, store
 from renderer.trace.best import NO_FACE, no_hit
 from renderer.trace.intersect import largest_of, make_shear
@@ -121,12 +122,12 @@ class Progress(NamedTuple):
 
 
 class _Query(NamedTuple):
-    """Rays under way, the pointers to their hits, the scratch that they share, and whether any hit will do."""
+    """Rays under way, the pointers to their hits, the scratch that they share, and ``any_hit`` as of ``trace``."""
 
     rays: RayPointers
     found: HitPointers
     scratch: ScratchPointers
-    any_hit: bool
+    any_hit: Any
 
 
 @inlined
@@ -141,19 +142,16 @@ def _finish(tree, query, r):
     # rule: resolve-uncertain
     if load(prepared.integers, UNRESOLVED + r) != 0 or slack == EDGE:
         stack = offset(scratch.lanes.stacks, stack_of(scratch.lanes, r))
-        careful = search_carefully(tree, rays, i, stack, scratch.holders, query.any_hit)
+        careful = search_carefully(tree, rays, i, stack, scratch.holders, query.any_hit is not None)
         best, steps = careful.best, careful.steps
     largest, dz = load(prepared.doubles, LARGEST + r), load(prepared.doubles, DIRECTION_Z + r)
-    write_best(tree, rays, query.found, i, best, slack, largest, dz, query.any_hit)
+    write_best(tree, rays, query.found, i, best, slack, largest, dz, query.any_hit is not None)
     return steps // MIN_ACTIVE
 
 
 @inlined
 def _enter(tree, query, lanes, count):
-    if query.any_hit:
-        meet_nodes(tree, query.scratch.prepared, lanes, count, unsorted)
-    else:
-        meet_nodes(tree, query.scratch.prepared, lanes, count, nearest_last)
+    meet_nodes(tree, query.scratch.prepared, lanes, count, of_none(query.any_hit, nearest_last, unsorted))
 
 
 @inlined
@@ -164,7 +162,7 @@ def _meet(tree, query, lanes, count):
 @inlined
 def _take(tree, query, k):
     hit = take_hits(tree, query.scratch.prepared, query.scratch.lanes, k)
-    return query.any_hit and hit
+    return query.any_hit is not None and hit
 
 
 @kernel
@@ -213,7 +211,7 @@ def _hand_over(tree, query, top, unresolved):
             meeting &= meeting - 1
     counts = _no_lanes()
     for r in range(WIDTH):
-        if query.any_hit and best_of(prepared, r).face != NO_FACE:
+        if query.any_hit is not None and best_of(prepared, r).face != NO_FACE:
             store(prepared.integers, UNRESOLVED + r, 0)
             _finish(tree, query, r)
         else:
@@ -246,17 +244,17 @@ def search_blocks(tree, rays, found, begin, end, holders, any_hit):
         ray, t_max = ray_at(rays, i)
         best, unresolved = no_hit(t_max), True
         if ray.slack != EDGE:
-            best, unresolved = search_all_blocks(tree, ray, t_max, any_hit)
+            best, unresolved = search_all_blocks(tree, ray, t_max, any_hit is not None)
         if unresolved:
             # Nothing waits on a stack where there are no nodes.
-            best = search_carefully(tree, rays, i, holders, holders, any_hit).best
+            best = search_carefully(tree, rays, i, holders, holders, any_hit is not None).best
         dz = make_shear(ray).direction_z
-        write_best(tree, rays, found, i, best, ray.slack, largest_of(ray), dz, any_hit)
+        write_best(tree, rays, found, i, best, ray.slack, largest_of(ray), dz, any_hit is not None)
 
 
 @kernel
 def trace(tree, rays, found, begin, end, scratch, any_hit):
-    """Closest hits, or with ``any_hit`` whether there is one, of the rays from ``begin`` to ``end``.
+    """Closest hits of the rays from ``begin`` to ``end`` if ``any_hit`` is None; whether there is one if it is True.
 
     The interval [t_min, t_max] is closed; t counts in units of |direction|; no face is culled. Among equal t the lowest
     face wins: a node is skipped only if its entry is beyond the best t, never at it. So the answer depends neither on

@@ -63,6 +63,25 @@ def push_children(tree, node, bits, stack, top):
 
 
 @inlined
+def push_in_order(tree, node, bits, order, stack, top):
+    """``push_children`` in an order of the octants."""
+    if bits & (bits - 1) == 0:
+        return push_children(tree, node, bits, stack, top)
+    # No branch: all are written, and the top moves by those pushed.
+    for k in range(8):
+        octant = np.int64(order) >> 3 * k & 7
+        store(stack, top, child_in(tree, node, octant))
+        top += bits >> octant & 1
+    return top
+
+
+@inlined
+def always(query, k, found):
+    """``reaches`` of a ``walk_nearest_first`` whose ``enter`` pushes no data."""
+    return True
+
+
+@inlined
 def walk(tree, stack, query, found, enter, visit):
     """Walk from the root to every leaf that a query reaches, last octants first. Returns what was found.
 

@@ -9,6 +9,7 @@ from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import maximum
 from renderer.trace.layout import BLOCK_FACES, CHILDREN, LEAF_BITS, NODE_WORDS, UNUSED
 from renderer.tree.bounds import BOX, FACE
+from renderer.tree.order import order_octants
 
 # The most parts that wait to become nodes: seven per level. Cuts by the split rule end after 3 * 64 levels, the
 # greatest ``max_depth``, and cuts in even halves within 31 more.
@@ -62,6 +63,7 @@ def emit_nodes(tree, numbers, ends, nodes, links, block_faces, scratch):
             else:
                 links[link] = leaf_link(blocks, tree.ranges[child, 1] - tree.ranges[child, 0])
                 blocks = emit_leaf(tree, child, numbers, block_faces, blocks)
+        order_octants(nodes, links, used - 1)
     return used, blocks, depth
 
 

@@ -10,7 +10,8 @@ from renderer.numerics.simd import minimum
 from renderer.trace.layout import BLOCK_FACES
 from renderer.tree.bounds import BOX
 
-MIDPOINT, SAH = 0, 1
+# None, so that kernels are compiled for it apart: those of most builds have no code of the midpoint rule.
+MIDPOINT, SAH = 0, None
 
 
 class Rule(NamedTuple):
@@ -18,7 +19,7 @@ class Rule(NamedTuple):
     split.
     """
 
-    split: int
+    split: int | None
     leaf_size: int
     max_depth: int
 

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
 from renderer.trace.intersect import ROOM
-from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS, Tree
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS, ORDERS, Tree
 from renderer.trace.walk import blocks_of
 
 
@@ -16,9 +16,9 @@ def faults(tree: Tree, mesh: Mesh) -> list[str]:
     Every node and block is reached exactly once; without faces there is none. A child's box contains its descendants'
     and the boxes of its faces, see ``intersect.face_range``. Every face, with its own vertices, is in exactly one
     place. No path is longer than ``tree.depth``. Unused places have no face and no area; unused octants have inverted
-    boxes.
+    boxes. The orders of a node have all octants, the farthest first.
     """
-    found = _block_faults(tree, mesh)
+    found = _block_faults(tree, mesh) + _order_faults(tree)
     nodes = len(tree.nodes) // NODE_WORDS
     reached, blocks_reached = np.zeros(nodes, np.int64), np.zeros(len(tree.faces) // BLOCK_FACES, np.int64)
     infinite = (np.full(3, -np.inf), np.full(3, np.inf))
@@ -95,6 +95,24 @@ def _block_faults(tree: Tree, mesh: Mesh) -> list[str]:
     return found
 
 
+def _order_faults(tree: Tree) -> list[str]:
+    """Orders of nodes that lack an octant, or have one before another that is farther, see ``tree.order``."""
+    words, links = tree.nodes.reshape(-1, NODE_WORDS), tree.links.reshape(-1, NODE_WORDS)
+    found: list[str] = []
+    for place in range(8):
+        signs = np.where(place >> np.arange(3) & 1, np.float32(-1.0), np.float32(1.0))
+        octants = links[:, ORDERS + place, None] >> 3 * np.arange(8) & 7
+        with np.errstate(invalid="ignore", over="ignore"):
+            x, y, z = words[:, :CHILDREN].reshape(-1, 3, 2, 8).sum(axis=2).swapaxes(0, 1) * signs[:, None, None]
+            far = x + y + z
+        far[np.isnan(far)] = 0.0
+        near_first = (np.diff(np.take_along_axis(far, octants, axis=1)) > 0.0).any(axis=1)
+        lacking = _octants_in(links[:, ORDERS + place]) != 0xFF
+        found += [f"node {node}: order {place} lacks an octant" for node in np.flatnonzero(lacking)]
+        found += [f"node {node}: order {place} has a near octant first" for node in np.flatnonzero(near_first)]
+    return found
+
+
 def check_safe(tree: Tree, face_count: int) -> None:
     """Raise ``ValueError`` for a tree that leads a traversal out of the arrays, into a cycle or beyond its stack.
 
@@ -115,6 +133,17 @@ def check_safe(tree: Tree, face_count: int) -> None:
     last = int((first + count - 1).max(initial=-1))
     expect(last < blocks, "nodes", f"leaves within {blocks} blocks", f"one up to block {last}")
     _check_levels(links, tree.depth)
+    ordered = _octants_in(tree.links.reshape(-1, NODE_WORDS)[:, ORDERS : ORDERS + 8])
+    lacking = int((ordered != 0xFF).sum())
+    expect(lacking == 0, "nodes", "orders with all octants", f"{lacking} that lack one")
+
+
+def _octants_in(orders: NDArray[np.int32]) -> NDArray[np.int32]:
+    """The bits of the octants that orders have."""
+    found = np.zeros(orders.shape, np.int32)
+    for k in range(8):
+        found |= 1 << (orders >> 3 * k & 7)
+    return found
 
 
 def _check_levels(links: NDArray[np.int32], depth: int) -> None:

@@ -17,6 +17,7 @@ from renderer.trace.layout import (
 )
 from renderer.trace.walk import blocks_of
 from renderer.tree.blocks import fill_blocks
+from renderer.tree.order import order_nodes
 
 # Nodes per chunk when leaves are fitted: some tenths of a millisecond.
 _NODES = 1 << 10
@@ -78,4 +79,5 @@ def refit_tree(tree: Tree, vertices: NDArray[np.float64], faces: NDArray[np.int3
         threads,
     )
     _fit_nodes(nodes, links)
+    for_chunks(lambda begin, end: order_nodes(nodes, links, begin, end), len(nodes) // NODE_WORDS, _NODES, threads)
     return Tree(nodes, fill_blocks(vertices, faces, tree.faces, threads), tree.faces, tree.depth, scale)

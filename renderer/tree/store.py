@@ -1,6 +1,6 @@
 """The file of a built octree: its mesh, tree and repairs, written whole, and checked when it is read.
 
-Version 1 of a file as ``container`` describes it. Its text has {"depth": 8, "scale": 1.0, "name": "teapot"}; of a mesh
+Version 2 of a file as ``container`` describes it. Its text has {"depth": 8, "scale": 1.0, "name": "teapot"}; of a mesh
 of several parts also "parts": [["body", 900], ["wheel", 120], ...], the name and the number of faces of each.
 ``_KINDS`` has the arrays that there are. ``trace.layout`` describes nodes and blocks; "block_faces" is ``Tree.faces``.
 """
@@ -40,7 +40,7 @@ _OF_MESH = ("vertices", "faces", "normals", "colors", "texcoords")
 _OF_REPAIRS = ("dropped_faces", "bad_vertices", "kept_faces", "bad_normals")
 _FORMAT = Format(
     magic=b"\x89OCTREE\n",
-    version=1,
+    version=2,
     content="an octree that Octree.save wrote",
     keys=("depth", "scale", "name"),
     optional=("parts",),

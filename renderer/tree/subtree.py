@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.jit.decorators import kernel
+from renderer.numerics.kinds import of_none
 from renderer.trace.layout import BLOCK_FACES, NODE_WORDS
 from renderer.tree.bounds import BOX, fit
 from renderer.tree.collapse import collapse, leaf_cost
 from renderer.tree.emit import EmitScratch, emit_leaf, emit_nodes, emit_scratch, leaf_link
-from renderer.tree.hierarchy import SAH, Hierarchy, add_part, new_hierarchy, whole_size
+from renderer.tree.hierarchy import Hierarchy, add_part, new_hierarchy, whole_size
 from renderer.tree.midpoint import OctantScratch, cut_octants, octant_scratch
 from renderer.tree.sah import BinScratch, bin_scratch, cut_sah
 
@@ -59,13 +60,22 @@ def cut_part(faces, tree, part, rule, level, count, scratch):
     """
     after, below = count, level + 1
     if level < 3 * rule.max_depth:
-        if rule.split == SAH or tree.ranges[part, 1] - tree.ranges[part, 0] <= _FEW:
-            after = cut_sah(faces, tree, part, count, scratch.bins)
-        else:
-            after, below = cut_octants(faces, tree, part, whole_size(rule), count, scratch.octants), level + 3
+        after, below = of_none(rule.split, _cut_in_two, _cut_by_size)(faces, tree, part, rule, level, count, scratch)
     if after == count:
         after, below = _cut_in_half(faces, tree, part, count), level + 1
     return after, below
+
+
+@kernel
+def _cut_in_two(faces, tree, part, rule, level, count, scratch):
+    return cut_sah(faces, tree, part, count, scratch.bins), level + 1
+
+
+@kernel
+def _cut_by_size(faces, tree, part, rule, level, count, scratch):
+    if tree.ranges[part, 1] - tree.ranges[part, 0] <= _FEW:
+        return _cut_in_two(faces, tree, part, rule, level, count, scratch)
+    return cut_octants(faces, tree, part, whole_size(rule), count, scratch.octants), level + 3
 
 
 @kernel

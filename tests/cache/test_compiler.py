@@ -168,7 +168,7 @@ from renderer.trace.traverse import new_scratch, scratch_pointers, trace
 def mine(descriptor, rays, out, memory):
     tree = tree_pointers(descriptor)
     source, found = batch_pointers(rays, tree.scale), hit_pointers(out, len(rays[1]))
-    trace(tree, source, found, 0, len(rays[1]), scratch_pointers(memory, source.starts), False)
+    trace(tree, source, found, 0, len(rays[1]), scratch_pointers(memory, source.starts), None)
 
 octree, rays = Octree.load(sys.argv[1]), np.random.default_rng(0).normal(size=(50, 3)) * 3
 expected = octree.closest_hit(rays, -rays)

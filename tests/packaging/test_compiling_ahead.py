@@ -37,7 +37,7 @@ from renderer.picture.prepare import prepare_scene
 from renderer.diagnostics.tree_boxes import visited
 from renderer.mesh.shapes import box
 for name in ("three_models", "stairs", "glass"):
-    for options in ({}, {"accelerator": "brute", "max_depth": 1}, {"split": "sah", "samples": 4}):
+    for options in ({}, {"accelerator": "brute", "max_depth": 1}, {"split": "midpoint", "samples": 4}):
         render(load_scene(f"scenes/{name}.toml"), resolution=(3, 2), **options)
     prepared = prepare_scene(load_scene(f"scenes/{name}.toml"), needs_of(load_scene(f"scenes/{name}.toml")), "octree")
     face_colors(prepared.arrays, [0, 1, 5])

@@ -8,7 +8,7 @@ from meshes import KINDS, assert_same_hits, make_mesh, meshes, options, rays_at
 
 from renderer.jit.decorators import kernel
 from renderer.mesh.shapes import icosphere
-from renderer.numerics.simd import pointer, splat8
+from renderer.numerics.simd import movemask, pointer, splat8
 from renderer.octree import BruteForce, Octree
 from renderer.trace.batch import RayBatch
 from renderer.trace.intersect import Ray, box_limit, enter_boxes, make_slabs, round_down
@@ -134,6 +134,28 @@ def test_what_is_coherent():
 
 
 @kernel
+def _slopes_of_beam(directions, slopes, room):
+    floats, doubles, integers = room
+    rays = Prepared(pointer(floats), pointer(doubles), pointer(integers), None)
+    for r in range(WIDTH):
+        d = directions[r]
+        prepare_ray(rays, r, Ray(0.0, 0.0, 0.0, d[0], d[1], d[2], 0.0, 0.0, -1.0), np.inf)
+    beam = make_beam(rays)
+    slopes[0], slopes[1], slopes[2], slopes[3] = beam.least_u, beam.most_u, beam.least_v, beam.most_v
+
+
+@cases("axis", range(3))
+def test_products_with_slopes_of_a_beam_along_an_axis_are_normal_numbers(axis):
+    """Below them each takes a processor a hundred cycles: packets straight down took three times as long."""
+    room = np.empty(GROUP_STRIDE, np.float32), np.empty(GROUP_STRIDE), np.empty(GROUP_STRIDE, np.int64)
+    slopes = np.zeros(4, np.float32)
+    for direction in (np.eye(3)[axis], -np.eye(3)[axis]):
+        _slopes_of_beam(np.tile(direction, (WIDTH, 1)), slopes, room)
+        assert (slopes[::2] < 0.0).all() and (slopes[1::2] > 0.0).all()
+        assert (np.abs(slopes) * 2.0**-60 >= np.finfo(np.float32).tiny).all() and (np.abs(slopes) < 1e-9).all()
+
+
+@kernel
 def _meet_beam_and_rays(nodes, origins, directions, t_max, room):
     floats, doubles, integers = room
     rays, alone, limit = Prepared(pointer(floats), pointer(doubles), pointer(integers), None), 0, np.float32(0.0)
@@ -145,7 +167,7 @@ def _meet_beam_and_rays(nodes, origins, directions, t_max, room):
         farthest = box_limit(t_max, largest)
         limit = max(limit, farthest)
         alone |= enter_boxes(nodes, 0, make_slabs(ray, largest), splat8(round_down(0.0)), splat8(farthest))[1]
-    return enter_beam(pointer(nodes), 0, make_beam(rays), limit)[1], alone
+    return movemask(enter_beam(pointer(nodes), 0, make_beam(rays), limit)[1]), alone
 
 
 def _beam_and_rays(nodes, origins, directions, t_max):

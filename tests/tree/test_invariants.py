@@ -11,7 +11,7 @@ from meshes import KINDS, make_mesh, meshes, options
 
 from renderer.mesh.mesh import Mesh
 from renderer.octree import Octree
-from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, LEAF_BITS, NODE_WORDS, Tree
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, LEAF_BITS, NODE_WORDS, ORDERS, Tree
 from renderer.tree.invariants import check_safe, faults
 
 
@@ -176,6 +176,18 @@ def test_a_wrong_number_of_blocks_is_found(change):
     first, count = code >> LEAF_BITS, (code & 7) + 1
     broken.links[place] = ~((first << LEAF_BITS) | ((count - 1 + change) & 7))
     assert any("block" in fault for fault in broken.found())
+
+
+def test_wrong_orders_are_found():
+    broken = Broken()
+    orders = broken.tree.links.reshape(-1, NODE_WORDS)[:, ORDERS : ORDERS + 8]
+    first, second = orders[0, 3] & 7, orders[0, 3] >> 3 & 7
+    orders[0, 3] ^= first ^ second
+    assert broken.found() == ["node 0: order 3 lacks an octant"]
+    with pytest.raises(ValueError, match="nodes: expected orders with all octants, got 1 that lack one"):
+        check_safe(broken.tree, len(broken.mesh.faces))
+    orders[0, 3] ^= (first ^ second) << 3
+    assert broken.found() == ["node 0: order 3 has a near octant first"]
 
 
 def test_an_understated_depth_is_found():

@@ -24,7 +24,7 @@ from signatures import SIGNATURES
 from renderer import Mesh, Octree
 from renderer.mesh.shapes import icosphere
 from renderer.system import files
-from renderer.trace.layout import BLOCK_WORDS, CACHE_LINE, CHILDREN, NODE_WORDS
+from renderer.trace.layout import ANY_ORDER, BLOCK_WORDS, CACHE_LINE, CHILDREN, NODE_WORDS, ORDERS
 from renderer.tree import container, store
 
 pytestmark = pytest.mark.judges("Octree.load", "Octree.save")
@@ -130,7 +130,7 @@ def test_the_file_is_as_its_description_says(path: Path) -> None:
     content = path.read_bytes()
     assert content[:8] == bytes.fromhex("89 4F 43 54 52 45 45 0A")
     order, version, length, crc = struct.unpack("<4I", content[8:24])
-    assert (order, version, crc) == (0x01020304, 1, zlib.crc32(content[:20] + content[24 : 24 + length]))
+    assert (order, version, crc) == (0x01020304, 2, zlib.crc32(content[:20] + content[24 : 24 + length]))
     told = json.loads(content[24 : 24 + length])
     assert told.keys() == {"depth", "scale", "name", "arrays"}
     assert (told["depth"], told["scale"], told["name"]) == (saved.tree.depth, saved.tree.scale, saved.mesh.name)
@@ -291,9 +291,9 @@ def test_a_file_cut_off_or_grown_anywhere_is_refused(mmap: bool, path: Path) -> 
 @MAPPED
 def test_another_version_and_order_of_bytes_are_told(mmap: bool, path: Path) -> None:
     content = whole(path)
-    for version in (0, 2, 2**32 - 1):
+    for version in (1, 3, 2**32 - 1):
         path.write_bytes(content[:12] + struct.pack("<I", version) + content[16:])
-        assert refusal(path, mmap) == f"version: expected 1, which this release reads, got {version}"
+        assert refusal(path, mmap) == f"version: expected 2, which this release reads, got {version}"
     path.write_bytes(content[:8] + struct.pack(">4I", *struct.unpack("<4I", content[8:24])) + content[24:])
     assert refusal(path, mmap) == "order of bytes: expected 0x01020304, little-endian, got 0x04030201"
 
@@ -529,6 +529,7 @@ def test_any_numbers_in_boxes_and_blocks_crash_no_query(fill: str, kind: str, mm
         boxes = nodes.reshape(-1, NODE_WORDS)[:, :CHILDREN].reshape(-1, 3, 2, 8)
         boxes[:, :, 0], boxes[:, :, 1], blocks[:] = -9.0, 9.0, rng.normal(size=len(blocks))
     links[:] = kept
+    nodes.view(np.int32).reshape(-1, NODE_WORDS)[:, ORDERS : ORDERS + 8] = ANY_ORDER
     path.write_bytes(forged(content, nothing, nodes=nodes, blocks=blocks))
     loaded = Octree.load(path, mmap=mmap)
     found = asked(loaded)
@@ -543,7 +544,7 @@ def test_more_leaves_than_blocks_crash_no_query(path: Path) -> None:
     nodes = np.zeros((count, NODE_WORDS), np.float32)
     nodes[:, :CHILDREN].reshape(count, 3, 2, 8)[:, :, 0], nodes[:, :CHILDREN].reshape(count, 3, 2, 8)[:, :, 1] = -1, 2
     links, levels = nodes.view(np.int32)[:, CHILDREN : CHILDREN + 8], np.zeros(count, int)
-    links[:] = -1  # the first block
+    links[:], nodes.view(np.int32)[:, ORDERS : ORDERS + 8] = -1, ANY_ORDER  # the first block
     for child in range(1, count):
         parent = (child - 1) // 8
         links[parent, (child - 1) % 8], levels[child] = child, levels[parent] + 1

@@ -16,6 +16,7 @@ import pytest
 from cases import cases
 from viewer_page import SCENE
 from websockets.exceptions import ConnectionClosedError
+from websockets.frames import Frame, Opcode
 from websockets.sync.client import connect
 
 import renderer
@@ -243,11 +244,13 @@ def test_a_message_of_the_largest_size_is_read(port: int) -> None:
 @cases("kind", [str, bytes])
 @cases("pieces", [1, 3])
 def test_a_larger_message_ends_its_connection_and_no_other(port: int, kind: type, pieces: int) -> None:
-    text = "x" * (MAX_MESSAGE_BYTES // pieces + 1)
-    piece = text if kind is str else text.encode()
+    """The last piece stays without its bytes: the server need not read them, and they cannot delay its answer."""
+    piece = b"x" * (MAX_MESSAGE_BYTES // pieces + 1)
+    codes = [Opcode.TEXT if kind is str else Opcode.BINARY] + [Opcode.CONT] * (pieces - 1)
+    frames = [Frame(code, piece, fin=k == pieces - 1).serialize(mask=True) for k, code in enumerate(codes)]
     with connected(port) as good, connected(port) as bad:
         with pytest.raises(ConnectionClosedError) as closed:
-            bad.send(piece if pieces == 1 else [piece] * pieces)
+            bad.socket.sendall(b"".join(frames)[: -len(piece)])
             bad.recv(30)
         assert closed.value.rcvd.code == 1009  # RFC 6455: too big
         good.send("x")

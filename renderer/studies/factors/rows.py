@@ -210,9 +210,10 @@ def _closest(tracing: Tracing, rays: RayBatch) -> Generator[None, None, Hits]:
     t, u, v = np.empty((3, rays.number))
     face, side, pile = np.empty((3, rays.number), np.int64)
     found = HitArrays(t, face, u, v, side, pile, np.empty(0, np.bool_))
-    row = yield from find_range(tree, rays, found, False, 0, rays.number)
-    if row >= 0:
-        reject(rays, row, tree.scale)
+    bad: list[int] = []
+    yield from find_range(tree, rays, found, None, 0, rays.number, bad)
+    if bad:
+        reject(rays, bad[0], tree.scale)
     return Hits(t, face, u, v, mesh, None, side, pile)
 
 

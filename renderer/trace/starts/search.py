@@ -59,7 +59,7 @@ from renderer.trace.starts.record import (
 )
 from renderer.trace.starts.region import NOT_STOPPED, Behind, bounding_holder, holder_of, stopping_holder
 from renderer.trace.trees import tree_pointers
-from renderer.trace.walk import walk
+from renderer.trace.walk import always, walk, walk_nearest_first
 
 # The boxes of the faces that hold a start hold it as rounded, with so much room of its coordinates.
 _ROOM = 2.0**-50
@@ -240,11 +240,12 @@ def _nearest_from(tree, first, count, departure, shear, best):
 
 
 class _Query(NamedTuple):
-    """A ray that leaves a surface, and whether any hit ends its walk."""
+    """A ray that leaves a surface, whether any hit ends its walk, and the stack of that."""
 
     departure: Departure
     single: SingleRay
     any_hit: bool
+    stack: Any
 
 
 @kernel
@@ -256,13 +257,8 @@ def search_from(tree, starts, i, ray, t_max, stack, memory, any_hit):
     departure, stopped = depart(tree, starts, i, ray, stack, memory)
     if stopped.face != NO_FACE:
         return Found(stopped, np.int64(1))
-    query = _Query(departure, prepare_single(departure.ray), any_hit)
-    return walk(tree, stack, query, Found(no_hit(t_max), np.int64(1)), _enter, _visit)
-
-
-@inlined
-def _enter(tree, query, node, found):
-    return enter_counted(tree, query.single, node, found)
+    query = _Query(departure, prepare_single(departure.ray), any_hit, stack)
+    return walk_nearest_first(tree, stack, query, Found(no_hit(t_max), np.int64(1)), always, enter_counted, _visit)
 
 
 @inlined

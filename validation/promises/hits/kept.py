@@ -146,9 +146,11 @@ def _other(rng: Generator) -> NDArray[np.bool_]:
         path = Path(folder) / "a.octree"
         Octree.from_mesh(_mesh(rng, True)).save(path)
         whole = path.read_bytes()
-        files = [(whole, False), (_with(whole, 1, 1), False)]
+        own = struct.unpack("<I", whole[12:16])[0]
+        files = [(whole, False), (_with(whole, 1, own), False)]
         files += [(file, True) for file in (whole + b"\0", whole + bytes(64), whole + whole, whole[:-1], whole[:-64])]
-        files += [(_with(whole, order, version), True) for order, version in ((1, 0), (1, 2), (1, 1 << 31), (-1, 1))]
+        others = ((1, own - 1), (1, own + 1), (1, 1 << 31), (-1, own))
+        files += [(_with(whole, order, version), True) for order, version in others]
         for file, bad in files:
             path.write_bytes(file)
             kept += [refuses(Octree.load, path, mmap=mapped) == bad for mapped in (False, True)]

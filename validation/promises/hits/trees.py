@@ -74,7 +74,7 @@ def _judged(tree: Tree, mesh: Mesh) -> dict[str, Bools]:
         "a node's box is that of its octants": _unites(found),
         "each node is reached once": np.bincount(links[~ends], minlength=len(where))[1:] == 1,
         "an octant without faces is empty": _is_empty(every[unused], where[unused], len(tree.faces) // 4),
-        "unused words of nodes are 0": (tree.nodes.reshape(-1, 64)[:, 56:] == 0.0).all(axis=1),
+        "orders have all octants, the farthest first": _ordered(tree.links.reshape(-1, 64)[:, 56:], every, unused),
         "a node but the first has two octants or more": (~unused).sum(axis=1)[1:] > 1,
         "the depth is the number of levels": np.array([tree.depth == len(found)]),
         "blocks hold their faces' corners": _holds(tree, mesh),
@@ -99,6 +99,23 @@ def _is_empty(boxes: levels.Floats, links: levels.Indices, blocks: int) -> Bools
     inverted = (boxes == [[np.inf] * 3, [-np.inf] * 3]).all(axis=(1, 2))
     kept: Bools = inverted & (links < 0) & (~links & 7 == 0) & (~links >> 3 < blocks)
     return kept
+
+
+def _ordered(orders: NDArray[np.int32], boxes: levels.Floats, unused: Bools) -> Bools:
+    """Whether the octal digits of each order are the octants, and no box has its middle farther along than one before.
+
+    Middles that differ by less than a millionth of the farthest may come in any order: the renderer's are float32.
+    """
+    kept = np.ones(orders.shape, np.bool_)
+    middles = np.where(unused[:, :, None, None], np.nan, boxes.astype(np.float64)).mean(axis=2)
+    near = 1e-6 * np.nanmax(np.abs(middles), axis=(1, 2))
+    for signs in range(8):
+        digits = orders[:, signs, None] // 8 ** np.arange(8) % 8
+        far = np.take_along_axis(middles @ (1.0 - 2.0 * (signs >> np.arange(3) & 1)), digits, axis=1)
+        before, after = np.triu_indices(8, 1)
+        kept[:, signs] = (np.sort(digits) == np.arange(8)).all(axis=1)
+        kept[:, signs] &= ~(far[:, after] > far[:, before] + near[:, None]).any(axis=1)
+    return kept.ravel()
 
 
 def _unites(found: list[levels.Level]) -> Bools:

@@ -46,7 +46,7 @@ def check_openings(rng: Generator, count: int) -> list[dict[str, Any]]:
                 given = visited(octree, unit * origin, unit * direction, t_max)
                 opened.append(_are(given, _visits(root, origin, direction, t_max)[0], unit))
     return [
-        row("a ray opens the boxes up to its closest hit, the nearest first", _JUDGE, np.array(opened)),
+        row("a ray opens the boxes up to its closest hit, in the order of their middles", _JUDGE, np.array(opened)),
         row("each level shows the boxes of its octants", _JUDGE, np.array(shown)),
     ]
 
@@ -88,8 +88,13 @@ def _visits(root: _Octant, origin: Floats, direction: Floats, t_max: float) -> t
         opened.append(octant)
         best = min(best, _hit(octant.triangles, origin, direction))
         met = [(_entry(inner, origin, direction), inner) for inner in octant.octants]
-        waiting += sorted((one for one in met if one[0] < np.inf), key=lambda one: one[0], reverse=True)
+        waiting += sorted((one for one in met if one[0] < np.inf), key=lambda one: -_along(one[1], direction))
     return opened, best
+
+
+def _along(octant: _Octant, direction: Floats) -> float:
+    """How far the middle of a box is along the diagonal with the direction's signs."""
+    return float(octant.box.mean(axis=0) @ np.sign(direction))
 
 
 def _entry(octant: _Octant, origin: Floats, direction: Floats) -> float:
