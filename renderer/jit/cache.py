@@ -107,7 +107,7 @@ class KernelStore:
         key = self._key(signature, compiled.library.codegen.magic_tuple())
         path = folder / self._file(key)
         try:
-            _write(path, key, dumps(compiled._reduce()))
+            _write(path, key, dumps(_needed(compiled._reduce())))
         except OSError as error:
             _Count.lost += 1
             _warn_once("unwritable", f"compiled kernels cannot be kept: {path}: {error.strerror}")
@@ -286,6 +286,12 @@ def _tolerant(path: Path) -> Iterator[None]:
         yield
     except Exception as error:
         _warn_once("damaged", f"a compiled kernel is damaged and is compiled anew: {path}: {error}")
+
+
+def _needed(reduced: tuple[Any, ...]) -> tuple[Any, ...]:
+    """A kernel's parts without the empty environments of its pieces: to read one, Numba would import its module."""
+    *parts, environments = reduced
+    return (*parts, tuple(environment for environment in environments if environment.consts))
 
 
 def _write(path: Path, key: tuple[str, ...], payload: bytes) -> None:
