@@ -15,7 +15,6 @@ from renderer.arguments.split import SPLIT, Split
 from renderer.arguments.types import ArrayLike
 from renderer.errors import MeshError, expect
 from renderer.mesh.foreign import TriangleMesh, has_triangles
-from renderer.mesh.load import load_mesh
 from renderer.mesh.mesh import Mesh, Repairs, foreign_arrays
 from renderer.queryable import Built, Queries
 from renderer.system.threads import checked_threads
@@ -443,6 +442,9 @@ def as_mesh(given: Any, faces: ArrayLike | None, repair: bool) -> tuple[Mesh, Re
     """
     expect(isinstance(repair, bool), "repair", "True or False", repr(repair))
     if isinstance(given, str | os.PathLike) and faces is None:
+        # Imported here, because all readers of files come with it.
+        from renderer.mesh.load import load_mesh
+
         return load_mesh(given, repair=repair), None
     if isinstance(given, Mesh) and faces is None:
         mesh = _checked_mesh(given)  # nothing in it needs repair
