@@ -56,6 +56,8 @@ _NEAR = 2.0**-48
 _FAR = 3
 # What a place along the longest side errs by at most, as a share of it and of the distance: eight roundings.
 _SLACK = 2.0**-50
+# The least normal number, which is divided by in place of zero.
+_LEAST = 2.0**-1022
 
 
 @kernel
@@ -337,7 +339,7 @@ def _meet_line(face, low, high):
     d = face.direction
     # Where the ray is nearest to the line. Of a ray along the side every place is as near as another.
     across = cross_pairs(as_pairs(d), face.along)
-    square = maximum(dot(heads(across), heads(across)), np.finfo(np.float64).tiny)
+    square = maximum(dot(heads(across), heads(across)), _LEAST)
     on_line = dot_pairs(cross_pairs(face.first, face.along), across)[0] / square
     # Where that is beyond an end of the side, or out of the box, the nearest there counts.
     nearest = _place(face, on_line)

@@ -114,6 +114,15 @@ def test_a_damaged_file_is_said_once_and_made_anew(package, kernels, damage):
     assert run(package) == LOADED
 
 
+def test_a_stored_kernel_is_read_without_the_modules_of_its_pieces(package):
+    # Numba's module imports SciPy. A forked process has it already.
+    middle = MIDDLE.replace("return 2 * x", "return (2 * x if x < np.finfo(np.float64).max else 0)")
+    (package / "middle.py").write_text(f"import numpy as np\n{middle}")
+    script, alone = f"{RUN}import sys; print('numba.np.arraymath' in sys.modules)", {"NUMBA_DISABLE_JIT": "0"}
+    assert run(package, script, **alone) == [*COMPILED, "True"]
+    assert run(package, script, **alone) == [*LOADED, "False"]
+
+
 def test_a_stored_kernel_that_cannot_be_rebuilt_is_made_anew(package, kernels):
     broken = "from numba.core.compiler import CompileResult\ndef no(*a): raise AttributeError('gone')\n"
     done = start(package, f"{broken}sound = CompileResult._rebuild\nCompileResult._rebuild = no\n{RUN}")
