@@ -21,7 +21,7 @@ from renderer.trace.starts.record import ALL, FACE, FACES, HEAD, IGNORED, MASK, 
 CHUNK = 8192
 
 _FLOAT64 = np.dtype(np.float64)
-_MOST = float(np.finfo(np.float64).max)
+_MOST, _ENDLESS = float(np.finfo(np.float64).max), float(np.inf)
 
 
 def _vectors(argument: str, values: ArrayLike) -> NDArray[Any]:
@@ -83,7 +83,8 @@ class RayBatch(NamedTuple):
         return len(self.origins) if len(self.origins) != 1 else len(self.directions)
 
 
-_ZERO, _INFINITY = np.zeros(1), np.full(1, np.inf)
+# The usual bounds of rays.
+ZERO, INFINITY = np.zeros(1), np.full(1, np.inf)
 NO_SHAPES: Mapping[str, tuple[int, ...]] = {}
 
 
@@ -99,12 +100,9 @@ def check_rays(
     ``starts`` has the shapes of ``leaving`` and ``side``. Whether each ray is in range is checked when it is traced.
     Raises ``ValueError`` naming the argument and, for a bad bound, its row.
     """
-    # Rays as most calls have them, for the sake of calls with few rays.
-    usual = type(t_min) is type(t_max) is float and t_min == 0.0 and t_max == np.inf and not starts
-    if usual and _is_plain(origins) and _is_plain(directions) and origins.shape == directions.shape:
-        return RayBatch(origins, directions, _ZERO, _INFINITY), origins.shape[:1]
+    if not starts and are_plain(origins, directions, t_min, t_max):
+        return RayBatch(origins, directions, ZERO, INFINITY), origins.shape[:1]
     origins, directions = _vectors("origins", origins), _vectors("directions", directions)
-    # The usual bounds share arrays.
     low = None if type(t_min) is float and t_min == 0.0 else real_argument("t_min", t_min)
     high = None if type(t_max) is float and t_max == np.inf else real_argument("t_max", t_max)
     alike = origins.shape == directions.shape and origins.ndim == 2 and origins.strides[0] and directions.strides[0]
@@ -119,8 +117,8 @@ def check_rays(
     return RayBatch(
         _doubles(origins),
         _doubles(directions),
-        _ZERO if low is None else _bound("t_min", low, shape, _MOST),
-        _INFINITY if high is None else _bound("t_max", high, shape, np.inf),
+        ZERO if low is None else _bound("t_min", low, shape, _MOST),
+        INFINITY if high is None else _bound("t_max", high, shape, np.inf),
     ), shape
 
 
@@ -166,6 +164,16 @@ def _rows(array: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
     if array.size > 3 and not any(array.strides[:-1]):
         return array[(0,) * (array.ndim - 1)].reshape(1, 3)
     return array.reshape(-1, 3)
+
+
+def are_plain(origins: Any, directions: Any, t_min: Any, t_max: Any) -> bool:
+    """Whether rays are as most calls have them: two arrays (n, 3) that kernels take as they are, and the usual bounds.
+
+    Few rays notice how long this takes.
+    """
+    if not (type(t_min) is type(t_max) is float and t_min == 0.0 and t_max == _ENDLESS):
+        return False
+    return _is_plain(origins) and _is_plain(directions) and origins.shape == directions.shape
 
 
 def _is_plain(values: ArrayLike) -> TypeGuard[NDArray[np.float64]]:

@@ -10,7 +10,7 @@ from renderer.jit.decorators import entry_of
 from renderer.mesh.mesh import Mesh
 from renderer.results.hits import Hits
 from renderer.system.threads import for_chunks
-from renderer.trace.batch import ALONE, CHUNK, NO_STARTS, RayBatch, reject
+from renderer.trace.batch import ALONE, CHUNK, INFINITY, NO_STARTS, ZERO, RayBatch, reject
 from renderer.trace.layout import BLOCK_FACES, Tree
 from renderer.trace.ray_lanes import WIDTH
 from renderer.trace.rays import HitArrays
@@ -35,36 +35,61 @@ _INT = np.dtype(np.int64)
 def closest_hits(tree: Tree, rays: RayBatch, mesh: Mesh, threads: int) -> Hits:
     """Closest hits of a batch."""
     count = rays.number
-    # Arrays of their own take less time to make than rows of one, which few rays notice.
+    if are_few(tree, count):
+        return closest_of_few(tree, mesh, count, *rays)
     t, u, v = np.empty(count), np.empty(count), np.empty(count)
     face, side = np.empty(count, _INT), np.empty(count, _INT)
     # Rays that start on no surface come upon the face that they hit.
     pile = None if rays.starts is NO_STARTS else np.empty(count, _INT)
-    unread = side if pile is None else pile
-    if count <= FEW and 0 < tree.depth <= FEW_DEPTH:
-        _trace_few(tree, rays, t, face, u, v, side, unread)
-    else:
-        _run(tree, rays, count, HitArrays(t, face, u, v, side, unread, _NO_HIT), threads, any_hit=None)
+    found = HitArrays(t, face, u, v, side, side if pile is None else pile, _NO_HIT)
+    _run(tree, rays, count, found, threads, any_hit=None)
     return Hits(t, face, u, v, mesh, None, side, pile)
 
 
 def any_hits(tree: Tree, rays: RayBatch, threads: int) -> NDArray[np.bool_]:
     """Whether each ray of a batch hits anything."""
     count = rays.number
-    if count <= FEW and 0 < tree.depth <= FEW_DEPTH:
-        unread, face, others = np.empty(count), np.empty(count, _INT), np.empty(count, _INT)
-        _trace_few(tree, rays, unread, face, unread, unread, others, others)
-        return face >= 0
+    if are_few(tree, count):
+        return any_of_few(tree, count, *rays)
     hit = np.empty(count, np.bool_)
     _run(tree, rays, count, HitArrays(_NO_T, _NO_FACE, _NO_T, _NO_T, _NO_FACE, _NO_FACE, hit), threads, any_hit=True)
     return hit
 
 
+def are_few(tree: Tree, count: int) -> bool:
+    """Whether so many rays go one by one, on the caller's thread."""
+    return count <= FEW and 0 < tree.depth <= FEW_DEPTH
+
+
+def closest_of_few(
+    tree: Tree, mesh: Mesh, count: int, origins: Floats, directions: Floats,
+    t_min: Floats = ZERO, t_max: Floats = INFINITY, starts: Integers = NO_STARTS,
+) -> Hits:  # fmt: skip
+    """``closest_hits`` of ``count`` rays that ``are_few``, by the arrays of a ``RayBatch``."""
+    # Arrays of their own take less time to make than rows of one, which few rays notice.
+    t, u, v = np.empty(count), np.empty(count), np.empty(count)
+    face, side = np.empty(count, _INT), np.empty(count, _INT)
+    pile = None if starts is NO_STARTS else np.empty(count, _INT)
+    unread = side if pile is None else pile
+    _trace_few(tree, origins, directions, t_min, t_max, starts, t, face, u, v, side, unread)
+    return Hits(t, face, u, v, mesh, None, side, pile)
+
+
+def any_of_few(
+    tree: Tree, count: int, origins: Floats, directions: Floats,
+    t_min: Floats = ZERO, t_max: Floats = INFINITY, starts: Integers = NO_STARTS,
+) -> NDArray[np.bool_]:  # fmt: skip
+    """``any_hits`` of ``count`` rays that ``are_few``, by the arrays of a ``RayBatch``."""
+    unread, face, others = np.empty(count), np.empty(count, _INT), np.empty(count, _INT)
+    _trace_few(tree, origins, directions, t_min, t_max, starts, unread, face, unread, unread, others, others)
+    return face >= 0
+
+
 def _trace_few(
-    tree: Tree, rays: RayBatch, t: Floats, face: Integers, u: Floats, v: Floats, side: Integers, pile: Integers
-) -> None:
+    tree: Tree, origins: Floats, directions: Floats, t_min: Floats, t_max: Floats, starts: Integers,
+    t: Floats, face: Integers, u: Floats, v: Floats, side: Integers, pile: Integers,
+) -> None:  # fmt: skip
     """Write the closest hits of a few rays, on the caller's thread."""
-    origins, directions, t_min, t_max, starts = rays
     row = UNRESOLVED
     if starts is NO_STARTS:
         row = entry_of(trace_few)(
@@ -77,7 +102,7 @@ def _trace_few(
         )
         _local.scratch = scratch
     if row >= 0:
-        reject(rays, row, tree.scale)
+        reject(RayBatch(origins, directions, t_min, t_max, starts), row, tree.scale)
 
 
 def rays_against_blocks(tree: Tree) -> int:
