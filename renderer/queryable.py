@@ -22,8 +22,8 @@ from renderer.results.closest_points import ClosestPoints
 from renderer.results.hits import AllHits, Hits, Passage
 from renderer.results.steps import Steps
 from renderer.system.threads import checked_threads
-from renderer.trace.batch import RayBatch, are_plain, check_rays, offset_origins
-from renderer.trace.closest import any_hits, any_of_few, are_few, closest_hits, closest_of_few
+from renderer.trace.batch import RayBatch, check_rays, count_plain, offset_origins
+from renderer.trace.closest import any_at_once, any_hits, closest_at_once, closest_hits, is_small
 from renderer.trace.error import add_errors
 from renderer.trace.layout import Tree
 from renderer.trace.leaving import check_leaving, shapes_of_starts
@@ -141,10 +141,10 @@ class Queries:
         """
         built = self._built
         # In one step, because a call with one ray would spend most of its time on the others.
-        if leaving is side is None and t_error is False and are_plain(origins, directions, t_min, t_max):
-            count = len(origins)
-            if are_few(built.tree, count):
-                return closest_of_few(built.tree, built.mesh, count, origins, directions)
+        if leaving is side is None and t_error is False:
+            count = count_plain(origins, directions, t_min, t_max)
+            if is_small(built.tree, count):
+                return closest_at_once(built.tree, built.mesh, count, origins, directions)
         rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving, side)
         hits = closest_hits(built.tree, rays, built.mesh, self.threads)
         if t_error is not False and flag_argument("t_error", t_error):
@@ -180,10 +180,10 @@ class Queries:
         array([False])
         """
         built = self._built
-        if leaving is side is None and are_plain(origins, directions, t_min, t_max):
-            count = len(origins)
-            if are_few(built.tree, count):
-                return any_of_few(built.tree, count, origins, directions)
+        if leaving is side is None:
+            count = count_plain(origins, directions, t_min, t_max)
+            if is_small(built.tree, count):
+                return any_at_once(built.tree, count, origins, directions)
         rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving, side)
         return any_hits(built.tree, rays, self.threads).reshape(shape)
 

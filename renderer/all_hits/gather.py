@@ -64,7 +64,7 @@ def gather_chunk(descriptor, rays, begin, end, choice, counts, doubles, integers
     """Gather the hits of the rays begin:end, and write their numbers to ``counts``, one int64 for each ray.
 
     doubles   (DOUBLE_ROWS, capacity) float64, integers (INTEGER_ROWS, capacity) int64: memory, and what is kept
-    scratch   a ``traverse.Scratch`` for CANDIDATE_WORDS rays
+    scratch   that of ``traverse.new_scratch`` for CANDIDATE_WORDS rays
 
     Returns the ray before which it ended, because the memory was full or after _WORK, or ``end``; and the row of a ray
     out of range, for which nothing is gathered, or -1.
@@ -83,7 +83,7 @@ def gather_rays(tree, source, begin, end, choice, counts, found, memory):
 
     source  ``RayPointers``
     found   ``Found``, whose first hits are those of the ray ``begin``
-    memory  ``ScratchPointers`` of a ``traverse.Scratch`` for CANDIDATE_WORDS rays
+    memory  ``ScratchPointers`` with room for CANDIDATE_WORDS rays
     """
     candidates = make_candidates(memory.waiting)
     hits, rounds, kept = np.int64(0), np.int64(0), np.int64(0)

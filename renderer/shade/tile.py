@@ -28,7 +28,7 @@ from renderer.shade.whitted import (
 from renderer.trace.layout import cache_aligned
 from renderer.trace.spawn import put_no_start
 from renderer.trace.starts.record import ON_SURFACE
-from renderer.trace.traverse import Scratch, new_scratch, scratch_pointers
+from renderer.trace.traverse import new_scratch, scratch_pointers
 from renderer.trace.trees import tree_pointers
 
 _BRIGHTEST = float(np.finfo(np.float32).max)
@@ -247,7 +247,7 @@ class TileScratch(NamedTuple):
     number of bundles traced in a call.
     """
 
-    trace: Scratch
+    trace: NDArray[np.int64]
     doubles: NDArray[np.float64]
     integers: NDArray[np.int64]
     hits: NDArray[np.bool_]

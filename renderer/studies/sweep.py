@@ -45,7 +45,7 @@ from renderer.trace.starts.record import (
     start_at,
 )
 from renderer.trace.starts.search import take_side
-from renderer.trace.traverse import Scratch, ScratchPointers, new_scratch, scratch_pointers, trace_rays
+from renderer.trace.traverse import ScratchPointers, new_scratch, scratch_pointers, trace_rays
 from renderer.trace.trees import tree_pointers
 
 TILE = 256
@@ -128,7 +128,7 @@ class SweepScratch(NamedTuple):
     doubles: NDArray[np.float64]
     integers: NDArray[np.int64]
     hits: NDArray[np.float64]
-    trace: Scratch
+    trace: NDArray[np.int64]
     parallel: ParallelScratch
 
 

@@ -31,7 +31,7 @@ from renderer.studies.sweep import (
 )
 from renderer.trace.rays import RayPointers
 from renderer.trace.starts.record import BARYCENTRIC, CODE, EDGE, FACE, ROW, SLACK, StartPointers
-from renderer.trace.traverse import Scratch, new_scratch, scratch_pointers
+from renderer.trace.traverse import new_scratch, scratch_pointers
 from renderer.trace.trees import tree_pointers
 
 # Hits that are gathered at once: sixteen for each ray of a list, 1.8 MB. A ray that has more needs more memory.
@@ -56,7 +56,7 @@ class ThroughScratch(NamedTuple):
     """
 
     sweep: SweepScratch
-    trace: Scratch
+    trace: NDArray[np.int64]
     doubles: NDArray[np.float64]
     integers: NDArray[np.int64]
     counts: NDArray[np.int64]

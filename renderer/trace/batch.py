@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple, TypeGuard
+from typing import Any, NamedTuple, TypeGuard, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,8 @@ from renderer.trace.starts.record import ALL, FACE, FACES, HEAD, IGNORED, MASK, 
 # The most rays of a chunk: small enough to share 1e5 rays between many threads and to stop within milliseconds on
 # Ctrl-C, large enough that taking a chunk costs nothing beside its 1 to 10 ms of tracing.
 CHUNK = 8192
+
+Floats = NDArray[np.float64]
 
 _FLOAT64 = np.dtype(np.float64)
 _MOST, _ENDLESS = float(np.finfo(np.float64).max), float(np.inf)
@@ -100,8 +102,9 @@ def check_rays(
     ``starts`` has the shapes of ``leaving`` and ``side``. Whether each ray is in range is checked when it is traced.
     Raises ``ValueError`` naming the argument and, for a bad bound, its row.
     """
-    if not starts and are_plain(origins, directions, t_min, t_max):
-        return RayBatch(origins, directions, ZERO, INFINITY), origins.shape[:1]
+    count = -1 if starts else count_plain(origins, directions, t_min, t_max)
+    if count >= 0:
+        return RayBatch(cast(Floats, origins), cast(Floats, directions), ZERO, INFINITY), (count,)
     origins, directions = _vectors("origins", origins), _vectors("directions", directions)
     low = None if type(t_min) is float and t_min == 0.0 else real_argument("t_min", t_min)
     high = None if type(t_max) is float and t_max == np.inf else real_argument("t_max", t_max)
@@ -166,14 +169,14 @@ def _rows(array: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
     return array.reshape(-1, 3)
 
 
-def are_plain(origins: Any, directions: Any, t_min: Any, t_max: Any) -> bool:
-    """Whether rays are as most calls have them: two arrays (n, 3) that kernels take as they are, and the usual bounds.
-
-    Few rays notice how long this takes.
+def count_plain(origins: Any, directions: Any, t_min: Any, t_max: Any) -> int:
+    """How many rays there are if they are as most calls have them: two arrays (n, 3) that kernels take as they are, and
+    the usual bounds. If not, -1. Few rays notice how long this takes.
     """
     if not (type(t_min) is type(t_max) is float and t_min == 0.0 and t_max == _ENDLESS):
-        return False
-    return _is_plain(origins) and _is_plain(directions) and origins.shape == directions.shape
+        return -1
+    plain = _is_plain(origins) and _is_plain(directions) and origins.shape == directions.shape
+    return len(origins) if plain else -1
 
 
 def _is_plain(values: ArrayLike) -> TypeGuard[NDArray[np.float64]]:

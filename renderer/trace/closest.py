@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +16,11 @@ from renderer.trace.layout import BLOCK_FACES, Tree
 from renderer.trace.ray_lanes import WIDTH
 from renderer.trace.rays import HitArrays
 from renderer.trace.single import FEW_DEPTH, UNRESOLVED, trace_carefully, trace_few
-from renderer.trace.traverse import Scratch, new_scratch, search_chunk, trace_chunk
-from renderer.trace.walk import stack_size
+from renderer.trace.traverse import holders_in, is_deep_enough, new_scratch, search_chunk, trace_chunk
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 # Few rays go in smaller chunks, sixteen per thread, so that no thread has much more to do than another.
 _LEAST_CHUNK = 1024
@@ -35,11 +36,10 @@ _INT = np.dtype(np.int64)
 def closest_hits(tree: Tree, rays: RayBatch, mesh: Mesh, threads: int) -> Hits:
     """Closest hits of a batch."""
     count = rays.number
-    if are_few(tree, count):
-        return closest_of_few(tree, mesh, count, *rays)
+    if is_small(tree, count):
+        return closest_at_once(tree, mesh, count, *rays)
     t, u, v = np.empty(count), np.empty(count), np.empty(count)
     face, side = np.empty(count, _INT), np.empty(count, _INT)
-    # Rays that start on no surface come upon the face that they hit.
     pile = None if rays.starts is NO_STARTS else np.empty(count, _INT)
     found = HitArrays(t, face, u, v, side, side if pile is None else pile, _NO_HIT)
     _run(tree, rays, count, found, threads, any_hit=None)
@@ -49,47 +49,60 @@ def closest_hits(tree: Tree, rays: RayBatch, mesh: Mesh, threads: int) -> Hits:
 def any_hits(tree: Tree, rays: RayBatch, threads: int) -> NDArray[np.bool_]:
     """Whether each ray of a batch hits anything."""
     count = rays.number
-    if are_few(tree, count):
-        return any_of_few(tree, count, *rays)
+    if is_small(tree, count):
+        return any_at_once(tree, count, *rays)
     hit = np.empty(count, np.bool_)
     _run(tree, rays, count, HitArrays(_NO_T, _NO_FACE, _NO_T, _NO_T, _NO_FACE, _NO_FACE, hit), threads, any_hit=True)
     return hit
 
 
-def are_few(tree: Tree, count: int) -> bool:
-    """Whether so many rays go one by one, on the caller's thread."""
-    return count <= FEW and 0 < tree.depth <= FEW_DEPTH
+def is_small(tree: Tree, count: int) -> bool:
+    """Whether so many rays are traced at once, on the caller's thread."""
+    return 0 <= count <= _LEAST_CHUNK and tree.depth > 0
 
 
-def closest_of_few(
-    tree: Tree, mesh: Mesh, count: int, origins: Floats, directions: Floats,
+def closest_at_once(
+    tree: Tree, mesh: Mesh, count: int, origins: Any, directions: Any,
     t_min: Floats = ZERO, t_max: Floats = INFINITY, starts: Integers = NO_STARTS,
 ) -> Hits:  # fmt: skip
-    """``closest_hits`` of ``count`` rays that ``are_few``, by the arrays of a ``RayBatch``."""
+    """Closest hits of a batch of ``count`` rays that ``is_small``, by its arrays."""
     # Arrays of their own take less time to make than rows of one, which few rays notice.
     t, u, v = np.empty(count), np.empty(count), np.empty(count)
     face, side = np.empty(count, _INT), np.empty(count, _INT)
+    # Rays that start on no surface come upon the face that they hit.
     pile = None if starts is NO_STARTS else np.empty(count, _INT)
     unread = side if pile is None else pile
-    _trace_few(tree, origins, directions, t_min, t_max, starts, t, face, u, v, side, unread)
+    if count <= FEW and tree.depth <= FEW_DEPTH:
+        _trace_few(tree, origins, directions, t_min, t_max, starts, t, face, u, v, side, unread)
+    else:
+        _trace_at_once(
+            tree, count, origins, directions, t_min, t_max, starts, t, face, u, v, side, unread, _NO_HIT, None
+        )
     return Hits(t, face, u, v, mesh, None, side, pile)
 
 
-def any_of_few(
-    tree: Tree, count: int, origins: Floats, directions: Floats,
+def any_at_once(
+    tree: Tree, count: int, origins: Any, directions: Any,
     t_min: Floats = ZERO, t_max: Floats = INFINITY, starts: Integers = NO_STARTS,
 ) -> NDArray[np.bool_]:  # fmt: skip
-    """``any_hits`` of ``count`` rays that ``are_few``, by the arrays of a ``RayBatch``."""
-    unread, face, others = np.empty(count), np.empty(count, _INT), np.empty(count, _INT)
-    _trace_few(tree, origins, directions, t_min, t_max, starts, unread, face, unread, unread, others, others)
-    return face >= 0
+    """Whether each ray of such a batch hits anything."""
+    if count <= FEW and tree.depth <= FEW_DEPTH:
+        unread, face, others = np.empty(count), np.empty(count, _INT), np.empty(count, _INT)
+        _trace_few(tree, origins, directions, t_min, t_max, starts, unread, face, unread, unread, others, others)
+        return face >= 0
+    hit = np.empty(count, np.bool_)
+    _trace_at_once(
+        tree, count, origins, directions, t_min, t_max, starts, _NO_T, _NO_FACE, _NO_T, _NO_T, _NO_FACE, _NO_FACE, hit,
+        True,
+    )  # fmt: skip
+    return hit
 
 
 def _trace_few(
     tree: Tree, origins: Floats, directions: Floats, t_min: Floats, t_max: Floats, starts: Integers,
     t: Floats, face: Integers, u: Floats, v: Floats, side: Integers, pile: Integers,
 ) -> None:  # fmt: skip
-    """Write the closest hits of a few rays, on the caller's thread."""
+    """Write the closest hits of a few rays."""
     row = UNRESOLVED
     if starts is NO_STARTS:
         row = entry_of(trace_few)(
@@ -98,9 +111,27 @@ def _trace_few(
     if row == UNRESOLVED:
         scratch, own = _take_scratch(tree.depth), ALONE if starts is NO_STARTS else starts
         row = trace_carefully(
-            tree.descriptor, origins, directions, t_min, t_max, own, t, face, u, v, side, pile, _NO_HIT, scratch.holders
-        )
+            tree.descriptor, origins, directions, t_min, t_max, own, t, face, u, v, side, pile, _NO_HIT,
+            holders_in(scratch),
+        )  # fmt: skip
         _local.scratch = scratch
+    if row >= 0:
+        reject(RayBatch(origins, directions, t_min, t_max, starts), row, tree.scale)
+
+
+def _trace_at_once(
+    tree: Tree, count: int, origins: Floats, directions: Floats, t_min: Floats, t_max: Floats, starts: Integers,
+    t: Floats, face: Integers, u: Floats, v: Floats, side: Integers, pile: Integers, hit: Flags, any_hit: bool | None,
+) -> None:  # fmt: skip
+    """Write the hits of a small batch."""
+    own, scratch = ALONE if starts is NO_STARTS else starts, _take_scratch(tree.depth)
+    chunk, reached, following, waiting, row = entry_of(trace_chunk), 0, 0, 0, -1
+    while row < 0 and (reached < count or following < waiting):
+        reached, following, waiting, row = chunk(
+            tree.descriptor, origins, directions, t_min, t_max, own, t, face, u, v, side, pile, hit, any_hit, scratch,
+            reached, following, waiting, count,
+        )  # fmt: skip
+    _local.scratch = scratch
     if row >= 0:
         reject(RayBatch(origins, directions, t_min, t_max, starts), row, tree.scale)
 
@@ -121,11 +152,7 @@ def _run(tree: Tree, rays: RayBatch, count: int, found: HitArrays, threads: int,
         if not bad or begin < bad[0]:
             yield from find_range(tree, rays, found, any_hit, begin, end, bad)
 
-    if count > size:
-        for_chunks(trace, count, size, threads)
-    else:
-        for _ in find_range(tree, rays, found, any_hit, 0, count, bad):
-            pass
+    for_chunks(trace, count, size, threads)
     if bad:
         reject(rays, min(bad), tree.scale)
 
@@ -146,7 +173,7 @@ def find_range(
             reached, following, waiting, row = chunk(*arrays, scratch, reached, following, waiting, end)
             yield
     else:
-        row = search_chunk(*arrays, scratch.holders, begin, end)
+        row = search_chunk(*arrays, holders_in(scratch), begin, end)
     _local.scratch = scratch
     if row >= 0:
         bad.append(int(row))
@@ -155,15 +182,15 @@ def find_range(
 class _Local(threading.local):
     """The scratch of a thread, kept from one chunk to the next: 100 kB."""
 
-    scratch: Scratch | None = None
+    scratch: Integers | None = None
 
 
 _local = _Local()
 
 
-def _take_scratch(depth: int) -> Scratch:
+def _take_scratch(depth: int) -> Integers:
     """The thread's scratch, or a new one. It is taken away, because a signal handler may trace rays during a chunk."""
     scratch, _local.scratch = _local.scratch, None
-    if scratch is None or scratch.stack_size < stack_size(depth):
+    if scratch is None or not is_deep_enough(scratch, depth):
         scratch = new_scratch(depth, CHUNK)
     return scratch

@@ -7,7 +7,17 @@ from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.kinds import of_none
-from renderer.numerics.simd import load, lowest_bit, minimum, offset, pointer, store
+from renderer.numerics.simd import (
+    address,
+    float32_pointer,
+    float64_pointer,
+    load,
+    lowest_bit,
+    minimum,
+    offset,
+    pointer,
+    store,
+)
 from renderer.trace.best import NO_FACE, no_hit
 from renderer.trace.intersect import largest_of, make_shear
 from renderer.trace.layout import cache_aligned
@@ -60,19 +70,9 @@ from renderer.trace.walk import stack_size
 _WORK = 1 << 14
 
 
-class Scratch(NamedTuple):
-    """Memory in which a thread traces rays: the arrays behind ``ScratchPointers``, and the entries of one stack."""
-
-    floats: NDArray[np.float32]
-    doubles: NDArray[np.float64]
-    integers: NDArray[np.int64]
-    holders: NDArray[np.int64]
-    stack_size: int
-
-
 class ScratchPointers(NamedTuple):
-    """Pointers into a ``Scratch``: prepared rays, of which a packet takes the first sixteen; a stream's lanes; a
-    packet's stack; the numbers of the rays that wait for a stream; and the faces that contain a start.
+    """Pointers into a scratch: prepared rays, of which a packet takes the first sixteen; a stream's lanes; a packet's
+    stack; the numbers of the rays that wait for a stream; and the faces that contain a start.
     """
 
     prepared: Prepared
@@ -82,33 +82,48 @@ class ScratchPointers(NamedTuple):
     holders: Any
 
 
-def new_scratch(depth: int, rays: int) -> Scratch:
-    """Memory for ranges of up to ``rays`` rays against a tree of ``depth`` levels."""
-    size, prepared = stack_size(depth), GROUPS * GROUP_STRIDE
-    integers = prepared + LANE_INTEGERS + (GROUPS * WIDTH + 1) * size + rays + WIDTH
-    return Scratch(
-        cache_aligned(prepared, np.float32),
-        cache_aligned(prepared + LANE_DOUBLES, np.float64),
-        cache_aligned(integers, np.int64),
-        np.empty(HOLDERS_WORDS, np.int64),
-        size,
-    )
+# A scratch is one array of int64, because Numba takes each array that it gets apart. These words begin its parts: the
+# entries of one stack; prepared rays as float32; prepared rays and lanes as float64; faces that contain a start;
+# prepared rays, lanes and stacks as int64.
+_STACK_SIZE, _FLOATS, _PREPARED = 0, 8, GROUPS * GROUP_STRIDE
+_DOUBLES = _FLOATS + _PREPARED // 2
+_HOLDERS = _DOUBLES + _PREPARED + LANE_DOUBLES
+_INTEGERS = _HOLDERS + HOLDERS_WORDS
+_BYTES = 8
+
+
+def new_scratch(depth: int, rays: int) -> NDArray[np.int64]:
+    """Memory in which a thread traces ranges of up to ``rays`` rays against a tree of ``depth`` levels."""
+    size = stack_size(depth)
+    integers = _PREPARED + LANE_INTEGERS + (GROUPS * WIDTH + 1) * size + rays + WIDTH
+    scratch = cache_aligned(_INTEGERS + integers, np.int64)
+    scratch[_STACK_SIZE] = size
+    return scratch
+
+
+def is_deep_enough(scratch: NDArray[np.int64], depth: int) -> bool:
+    """Whether a scratch serves a tree of ``depth`` levels."""
+    return int(scratch[_STACK_SIZE]) >= stack_size(depth)
+
+
+def holders_in(scratch: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The part of a scratch for the faces that contain a start."""
+    return scratch[_HOLDERS:_INTEGERS]
 
 
 @inlined
 def scratch_pointers(scratch, starts):
-    """The ``ScratchPointers`` into a ``Scratch``, for rays with ``starts``, or ON_SURFACE."""
-    floats, doubles, integers = pointer(scratch.floats), pointer(scratch.doubles), pointer(scratch.integers)
-    size, lane_integers = scratch.stack_size, offset(integers, GROUPS * GROUP_STRIDE)
-    lanes = make_lanes(lane_integers, offset(doubles, GROUPS * GROUP_STRIDE), size)
+    """The ``ScratchPointers`` into a scratch, for rays with ``starts``, or ON_SURFACE."""
+    words, start = pointer(scratch), address(scratch)
+    floats, doubles = float32_pointer(start + _BYTES * _FLOATS), float64_pointer(start + _BYTES * _DOUBLES)
+    size, integers = load(words, _STACK_SIZE), offset(words, _INTEGERS)
+    lane_integers = offset(integers, _PREPARED)
+    lanes = make_lanes(lane_integers, offset(doubles, _PREPARED), size)
     packet_stack = offset(lane_integers, LANE_INTEGERS + GROUPS * WIDTH * size)
     return ScratchPointers(
-        Prepared(floats, doubles, integers, starts),
-        lanes,
-        packet_stack,
-        offset(packet_stack, size),
-        pointer(scratch.holders),
-    )
+        Prepared(floats, doubles, integers, starts), lanes, packet_stack, offset(packet_stack, size),
+        offset(words, _HOLDERS),
+    )  # fmt: skip
 
 
 class Progress(NamedTuple):

@@ -50,8 +50,8 @@ def unchecked(descriptor, rays, out, any_hit, memory, by_blocks):
 def answers(octree, rays, any_hit, by_blocks=False):
     """t, u, v, face and side of rays that nobody checked, or hit; the words around the scratch are as they were."""
     count, memory = len(rays[1]), new_scratch(octree.tree.depth, len(rays[1]))
-    padded = np.full(len(memory.integers) + 128, GUARD, np.int64)
-    memory = memory._replace(integers=padded[64:-64])
+    padded = np.full(len(memory) + 128, GUARD, np.int64)
+    padded[64:-64], memory = memory, padded[64:-64]
     out = np.full((HIT_ROWS, count), -7.0)
     unchecked(octree.tree.descriptor, rays, out, any_hit, memory, by_blocks)
     assert (padded[:64] == GUARD).all()
