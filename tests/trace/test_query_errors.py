@@ -57,7 +57,8 @@ def test_the_first_bad_row_is_named_in_a_batch_of_any_size(query: Any) -> None:
     directions[[1, 3]] = 0
     many = np.ones((100_000, 3))
     many[99_999] = np.nan
-    for origins, bad, row in ((GOOD, directions, 1), (with_row(2, np.nan), directions, 1), (GOOD[0], many, 99_999)):
+    few, some = (GOOD, directions, 1), (np.ones((100, 3)), np.tile(directions, (25, 1)), 1)
+    for origins, bad, row in (few, (with_row(2, np.nan), directions, 1), some, (GOOD[0], many, 99_999)):
         with pytest.raises(ValueError, match=rf"^directions: .* in row {row}$"):
             query(origins, bad)
 
