@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.errors import expect
 from renderer.lazy import lazy
 
 T = TypeVar("T", bound=np.generic)
@@ -22,6 +23,8 @@ CHILDREN = 48
 # of its place: 1, 2 and 4 are set in it where x, y and z are negative. See ``tree.order``.
 ORDERS = 56
 ANY_ORDER = 0o76543210
+# To be raised when the memory of a node changes: pickles of another form are refused.
+FORM = 2
 
 # A child >= 0 is a node. A child < 0 is a leaf: ~child holds its first block and, in the low three bits, its number
 # of blocks less one.
@@ -85,7 +88,7 @@ class Tree:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copy and pickle without the addresses, which are those of this object's arrays."""
-        return _restored, (self.nodes, self.blocks, self.faces, self.depth, self.scale)
+        return _restored, (self.nodes, self.blocks, self.faces, self.depth, self.scale, FORM)
 
 
 def root_box(nodes: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -94,7 +97,10 @@ def root_box(nodes: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[n
     return rows[:, 0].min(axis=1).astype(np.float64), rows[:, 1].max(axis=1).astype(np.float64)
 
 
-def _restored(nodes: NDArray[Any], blocks: NDArray[Any], faces: NDArray[np.int32], depth: int, scale: float) -> Tree:
+def _restored(
+    nodes: NDArray[Any], blocks: NDArray[Any], faces: NDArray[np.int32], depth: int, scale: float, form: int = 1
+) -> Tree:
+    expect(form == FORM, "pickle", "an octree of this release", "one of an earlier release; build it again")
     return Tree(_aligned(nodes), _aligned(blocks), faces, depth, scale)
 
 

@@ -26,6 +26,13 @@ def used(kind: Any) -> Any:
     return octree
 
 
+def test_a_pickle_of_nodes_without_orders_is_refused() -> None:
+    restore, (*parts, form) = Octree(icosphere(1)).tree.__reduce__()
+    assert restore(*parts, form).depth > 0
+    with pytest.raises(ValueError, match=r"^pickle: expected an octree of this release, got one of an earlier"):
+        restore(*parts)
+
+
 @by_any_way
 @pytest.mark.parametrize("kind", [Octree, BruteForce])
 def test_a_copy_of_a_used_tree_outlives_it(kind: Any, way: str) -> None:
