@@ -1,4 +1,4 @@
-"""The orders of a node's octants, from the farthest to the nearest, for rays of each combination of signs.
+"""The orders of a node's octants for rays of each combination of signs: octal digits, the farthest as the last.
 
 Octants are ordered by the middles of their boxes along the diagonal with these signs. A ray that sorts its octants by
 the distances at which it enters them visits up to 1 % fewer nodes, in cities as many more, and takes longer.
