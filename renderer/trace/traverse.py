@@ -84,11 +84,12 @@ class ScratchPointers(NamedTuple):
 
 # A scratch is one array of int64, because Numba takes each array that it gets apart. These words begin its parts: the
 # entries of one stack; prepared rays as float32; prepared rays and lanes as float64; faces that contain a start;
-# prepared rays, lanes and stacks as int64.
+# prepared rays, lanes and stacks as int64. Between them is as much as keeps the first group of each kind apart in the
+# cache: at equal places of 4 kB, packets took a sixth longer.
 _STACK_SIZE, _FLOATS, _PREPARED = 0, 8, GROUPS * GROUP_STRIDE
-_DOUBLES = _FLOATS + _PREPARED // 2
+_DOUBLES = _FLOATS + _PREPARED // 2 + GROUP_STRIDE // 2
 _HOLDERS = _DOUBLES + _PREPARED + LANE_DOUBLES
-_INTEGERS = _HOLDERS + HOLDERS_WORDS
+_INTEGERS = _HOLDERS + HOLDERS_WORDS + GROUP_STRIDE
 _BYTES = 8
 
 
