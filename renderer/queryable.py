@@ -124,8 +124,8 @@ class Queries:
 
         Notes
         -----
-        A ray in a face's plane misses the face, unless rounding of its slopes lifts it out of the plane. The bits are
-        the same for any number of threads.
+        A ray in a face's plane misses the face, unless rounding of its slopes lifts it out of the plane. A component of
+        a direction below 2^-700 of the largest counts as 0. The bits are the same for any number of threads.
 
         Examples
         --------

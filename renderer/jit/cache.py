@@ -289,9 +289,11 @@ def _tolerant(path: Path) -> Iterator[None]:
 
 
 def _needed(reduced: tuple[Any, ...]) -> tuple[Any, ...]:
-    """A kernel's parts without the empty environments of its pieces: to read one, Numba would import its module."""
+    """A kernel's parts without the empty environments of Numba's own functions: to read one, Numba imports its module,
+    and some of these import SciPy.
+    """
     *parts, environments = reduced
-    return (*parts, tuple(environment for environment in environments if environment.consts))
+    return (*parts, tuple(e for e in environments if e.consts or not e.globals["__name__"].startswith("numba.")))
 
 
 def _write(path: Path, key: tuple[str, ...], payload: bytes) -> None:

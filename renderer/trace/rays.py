@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.arguments.limits import FARTHEST, LONGEST, SHORTEST
+from renderer.arguments.limits import FARTHEST, FLATTEST, LONGEST, SHORTEST
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.kinds import of_none
 from renderer.numerics.simd import (
@@ -204,9 +204,18 @@ def _scaled(origin, direction, t_min, t_max, scale, slack, leaving, mask, ignore
     """Rays in the tree's units, given its ``scale``, and their t_max."""
     # A t_min above 0 stays above 0 in the tree's units too, so that a hit at the origin is still too near.
     t_min = select(t_min > 0.0, maximum(t_min * scale, _TINIEST), t_min)
-    ray = Ray(origin[0] * scale, origin[1] * scale, origin[2] * scale, *direction, t_min, slack, leaving, mask, ignored)
+    dx, dy, dz = direction
+    least = maximum(fabs(dx), maximum(fabs(dy), fabs(dz))) * FLATTEST
+    dx, dy, dz = _not_flat(dx, least), _not_flat(dy, least), _not_flat(dz, least)
+    ray = Ray(origin[0] * scale, origin[1] * scale, origin[2] * scale, dx, dy, dz, t_min, slack, leaving, mask, ignored)
     # A hit whose t is beyond the largest float64, in either unit, is none.
     return ray, minimum(minimum(t_max, _MOST) * scale, _MOST)
+
+
+@inlined
+def _not_flat(x, least):
+    """A component of a direction, or 0."""
+    return select(fabs(x) < least, 0.0, x)
 
 
 @inlined

@@ -123,6 +123,12 @@ def test_a_stored_kernel_is_read_without_the_modules_of_its_pieces(package):
     assert run(package, script, **alone) == [*LOADED, "False"]
 
 
+def test_a_stored_kernel_prints_what_a_kernel_that_it_calls_prints(package):
+    (package / "middle.py").write_text(MIDDLE.replace("    return", "    print(x)\n    return"))
+    assert run(package) == ["3", *COMPILED]
+    assert run(package) == ["3", *LOADED]
+
+
 def test_a_stored_kernel_that_cannot_be_rebuilt_is_made_anew(package, kernels):
     broken = "from numba.core.compiler import CompileResult\ndef no(*a): raise AttributeError('gone')\n"
     done = start(package, f"{broken}sound = CompileResult._rebuild\nCompileResult._rebuild = no\n{RUN}")

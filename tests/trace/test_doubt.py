@@ -55,6 +55,17 @@ def test_a_closed_mesh_whose_corners_lie_a_few_roundings_apart_does_not_leak():
         assert accelerator.closest_hit(*ray).t[0] == pytest.approx(1.0, abs=1e-14)
 
 
+@cases("component", [5e-324, -5e-324, 1e-300, 1e-212])
+def test_a_direction_that_hardly_leaves_an_axis_lies_along_it(component):
+    """Whether the face in the ray's plane was hit depended on the other face, and on the tree."""
+    vertices = np.array([[0, 1, 0], [1, 0, 0], [2, 1, 0], [8, 1, 0], [9, 0, 0], [10, 1, 0]]) / 4
+    origin, directions = [0.07145, 0.22215, 0.0], [[-1.0, 0.0, component]] * 17
+    for faces in ([[0, 1, 2]], [[0, 1, 2], [3, 4, 5]]):
+        for accelerator in (Octree(vertices, faces, leaf_size=1), BruteForce(vertices, faces)):
+            assert not accelerator.closest_hit(origin, directions).hit.any()
+            assert not accelerator.any_hit(origin, directions[:1]).any()
+
+
 @cases("width", [0.0, 1e-15, 1e-12, 1e-9, 1e-8, 1e-7, 1e-6, 1e-3])
 def test_a_ray_that_leaves_a_thin_face_starts_there(width):
     """The start had moved by 264 u over the face's relative width, without end. Now it moves by 2^-31 at most."""
