@@ -135,7 +135,8 @@ def points(run: Record) -> str:
 def builds(run: Record) -> str:
     """Builds, refits and memory of the larger meshes, mean and range; calls of few rays."""
     large = [row for row in run["builds"] if row["faces"] >= BUILD_FACES]
-    names = {"build": "build", "refit": "refit, beside the other's build", "memory": "memory at rest, the other's over ours"}
+    names = {"build": "build", "refit": "refit, beside the other's build",
+             "memory": "memory at rest, the other's over ours"}  # fmt: skip
     rows = [(name, *(_range([row[key][p] for row in large if p in row[key]]) for p in PEERS))
             for key, name in names.items() if any(row[key] for row in large)]  # fmt: skip
     rows += [(f"a call of {row['rays']}, ours {row['median']['ours']:.2g} us",
