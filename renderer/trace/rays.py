@@ -214,8 +214,8 @@ def _scaled(origin, direction, t_min, t_max, scale, slack, leaving, mask, ignore
 
 @inlined
 def _not_flat(x, least):
-    """A component of a direction, or 0."""
-    return select(fabs(x) < least, 0.0, x)
+    """A component of a direction, or a zero of its sign."""
+    return select(fabs(x) < least, x * 0.0, x)
 
 
 @inlined

@@ -361,7 +361,8 @@ def test_forged_octrees_are_refused_by_their_number(mmap: bool, path: Path) -> N
 
 
 def links_of(nodes: NDArray[np.float32]) -> NDArray[np.int32]:
-    return nodes.view(np.int32).reshape(-1, NODE_WORDS)[:, CHILDREN : CHILDREN + 8]
+    """The links of nodes and their orders, which are checked."""
+    return nodes.view(np.int32).reshape(-1, NODE_WORDS)[:, CHILDREN:]
 
 
 @MAPPED
