@@ -3,7 +3,7 @@
 from __future__ import annotations  # so that help() shows ArrayLike by its name
 
 import warnings
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,8 @@ from renderer.results.closest_points import ClosestPoints
 from renderer.results.hits import AllHits, Hits, Passage
 from renderer.results.steps import Steps
 from renderer.system.threads import checked_threads
-from renderer.trace.batch import RayBatch, check_rays, count_plain, offset_origins
-from renderer.trace.closest import any_at_once, any_hits, closest_at_once, closest_hits, is_small
+from renderer.trace.batch import RayBatch, are_plain, check_rays, offset_origins
+from renderer.trace.closest import any_hits, closest_hits
 from renderer.trace.error import add_errors
 from renderer.trace.layout import Tree
 from renderer.trace.leaving import check_leaving, shapes_of_starts
@@ -141,12 +141,10 @@ class Queries:
         """
         built = self._built
         # In one step, because a call with one ray would spend most of its time on the others.
-        if leaving is side is None and t_error is False:
-            count = count_plain(origins, directions, t_min, t_max)
-            if is_small(built.tree, count):
-                return closest_at_once(built.tree, built.mesh, count, origins, directions)
+        if leaving is side is None and t_error is False and are_plain(origins, directions, t_min, t_max):
+            return closest_hits(built.tree, built.mesh, self.threads, cast(Any, origins), cast(Any, directions))
         rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving, side)
-        hits = closest_hits(built.tree, rays, built.mesh, self.threads)
+        hits = closest_hits(built.tree, built.mesh, self.threads, *rays)
         if t_error is not False and flag_argument("t_error", t_error):
             add_errors(hits, rays, None, built.tree.scale, self.threads)
         return hits.shaped(shape)
@@ -180,12 +178,10 @@ class Queries:
         array([False])
         """
         built = self._built
-        if leaving is side is None:
-            count = count_plain(origins, directions, t_min, t_max)
-            if is_small(built.tree, count):
-                return any_at_once(built.tree, count, origins, directions)
+        if leaving is side is None and are_plain(origins, directions, t_min, t_max):
+            return any_hits(built.tree, self.threads, cast(Any, origins), cast(Any, directions))
         rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving, side)
-        return any_hits(built.tree, rays, self.threads).reshape(shape)
+        return any_hits(built.tree, self.threads, *rays).reshape(shape)
 
     def all_hits(
         self,
@@ -319,8 +315,7 @@ class Queries:
     ) -> tuple[RayBatch, tuple[int, ...]]:
         """The arguments of a query, checked, and moved off the faces that the rays leave; and their dimensions."""
         if leaving is None:
-            if side is not None:
-                expect(False, "side", "None without leaving", repr(side)[:40])
+            expect(side is None, "side", "None without leaving", repr(side)[:40])
             return check_rays(origins, directions, t_min, t_max)
         rays, shape = check_rays(origins, directions, t_min, t_max, shapes_of_starts(leaving, side))
         left = check_leaving(leaving, side, shape, len(built.mesh.faces))

@@ -201,7 +201,7 @@ class Steps:
             starts = make_starts(1, self.prepared.mesh)
             starts[HEAD:].view(np.float64)[:] = start
             rays = rays._replace(starts=starts)
-        return closest_hits(self.prepared.tree, rays, self.prepared.mesh, 1)
+        return closest_hits(self.prepared.tree, self.prepared.mesh, 1, *rays)
 
     def beyond(self, origin: Vector, direction: Vector) -> Vector:
         """The point in unit ``direction`` that is certainly beyond the sphere around all faces."""

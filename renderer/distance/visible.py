@@ -66,12 +66,12 @@ def _end(tree: Tree, mesh: Mesh, points: Floats, faces: NDArray[np.int64], threa
 
 def _are_open(tree: Tree, mesh: Mesh, start: _Ends, stop: _Ends, threads: int) -> NDArray[np.bool_]:
     """Whether nothing lies between the ends of segments."""
-    seen = ~any_hits(tree, _between(tree, mesh, start, stop, threads), threads)
+    seen = ~any_hits(tree, threads, *_between(tree, mesh, start, stop, threads))
     # If the first face hit is one that contains the end, nothing lies before the end.
     doubtful = np.flatnonzero(~seen & (stop.places.faces >= 0))
     if len(doubtful):
         start, stop = _picked(start, doubtful), _picked(stop, doubtful)
-        first = closest_hits(tree, _between(tree, mesh, start, stop, threads), mesh, threads).face
+        first = closest_hits(tree, mesh, threads, *_between(tree, mesh, start, stop, threads)).face
         met = np.flatnonzero(first >= 0)
         seen[doubtful[met]] = are_on(mesh, stop.points[met], first[met])
     return seen

@@ -93,7 +93,7 @@ class SceneQueries:
         """
         built = self._built
         rays, shape = rays_of(built, origins, directions, t_min, t_max, Choice(leaving, mask, ignore, faces))
-        hits = closest_hits(built.tree_for(rays, faces), rays, built.mesh, self.threads)
+        hits = closest_hits(built.tree_for(rays, faces), built.mesh, self.threads, *rays)
         if flag_argument("t_error", t_error):
             _add_errors(built, hits, rays, None, self.threads)
         return SceneHits(hits.shaped(shape), built)
@@ -132,7 +132,7 @@ class SceneQueries:
         """
         built = self._built
         rays, shape = rays_of(built, origins, directions, t_min, t_max, Choice(leaving, mask, ignore, faces))
-        return any_hits(built.tree_for(rays, faces), rays, self.threads).reshape(shape)
+        return any_hits(built.tree_for(rays, faces), self.threads, *rays).reshape(shape)
 
     def all_hits(
         self,

@@ -42,7 +42,7 @@ def hits_from_stand(
     rays = offset_origins(rays, leaving, own, built.tree.scale, threads)
     rows = rays.starts[HEAD:].view(np.float64).reshape(count, ROW)
     rows[:, FACE], rows[:, WAY : WAY + 3], rows[:, MASK], rows[:, IGNORED] = row[FACE], outer, ALL, -1.0
-    hits = closest_hits(built.tree, rays, built.mesh, threads)
+    hits = closest_hits(built.tree, built.mesh, threads, *rays)
     return SceneHits(hits, built) if isinstance(built, BuiltScene) else hits
 
 

@@ -23,7 +23,7 @@ CHUNK = 8192
 Floats = NDArray[np.float64]
 
 _FLOAT64 = np.dtype(np.float64)
-_MOST, _ENDLESS = float(np.finfo(np.float64).max), float(np.inf)
+_MOST = float(np.finfo(np.float64).max)
 
 
 def _vectors(argument: str, values: ArrayLike) -> NDArray[Any]:
@@ -61,6 +61,8 @@ def _no_starts() -> NDArray[np.int64]:
     return starts
 
 
+# The usual bounds of rays.
+ZERO, INFINITY = np.zeros(1), np.full(1, np.inf)
 # The starts of rays that start on no surface; and for kernels that are compiled apart for such rays.
 NO_STARTS = _no_starts()
 ALONE = np.zeros(1, np.uint64)
@@ -75,18 +77,21 @@ class RayBatch(NamedTuple):
 
     origins: NDArray[np.float64]
     directions: NDArray[np.float64]
-    t_min: NDArray[np.float64]
-    t_max: NDArray[np.float64]
+    t_min: NDArray[np.float64] = ZERO
+    t_max: NDArray[np.float64] = INFINITY
     starts: NDArray[np.int64] = NO_STARTS
 
     @property
     def number(self) -> int:
         """How many rays there are."""
-        return len(self.origins) if len(self.origins) != 1 else len(self.directions)
+        return count_rays(self.origins, self.directions)
 
 
-# The usual bounds of rays.
-ZERO, INFINITY = np.zeros(1), np.full(1, np.inf)
+def count_rays(origins: NDArray[np.float64], directions: NDArray[np.float64]) -> int:
+    """How many rays there are, by the arrays of a ``RayBatch``."""
+    return len(origins) if len(origins) != 1 else len(directions)
+
+
 NO_SHAPES: Mapping[str, tuple[int, ...]] = {}
 
 
@@ -102,9 +107,9 @@ def check_rays(
     ``starts`` has the shapes of ``leaving`` and ``side``. Whether each ray is in range is checked when it is traced.
     Raises ``ValueError`` naming the argument and, for a bad bound, its row.
     """
-    count = -1 if starts else count_plain(origins, directions, t_min, t_max)
-    if count >= 0:
-        return RayBatch(cast(Floats, origins), cast(Floats, directions), ZERO, INFINITY), (count,)
+    if not starts and are_plain(origins, directions, t_min, t_max):
+        rays = RayBatch(cast(Floats, origins), cast(Floats, directions))
+        return rays, (rays.number,)
     origins, directions = _vectors("origins", origins), _vectors("directions", directions)
     low = None if type(t_min) is float and t_min == 0.0 else real_argument("t_min", t_min)
     high = None if type(t_max) is float and t_max == np.inf else real_argument("t_max", t_max)
@@ -169,14 +174,14 @@ def _rows(array: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
     return array.reshape(-1, 3)
 
 
-def count_plain(origins: Any, directions: Any, t_min: Any, t_max: Any) -> int:
-    """How many rays there are if they are as most calls have them: two arrays (n, 3) that kernels take as they are, and
-    the usual bounds. If not, -1. Few rays notice how long this takes.
+def are_plain(origins: Any, directions: Any, t_min: Any, t_max: Any) -> bool:
+    """Whether rays are as most calls have them: two arrays (n, 3) that kernels take as they are, and the usual bounds.
+
+    Few rays notice how long this takes.
     """
-    if not (type(t_min) is type(t_max) is float and t_min == 0.0 and t_max == _ENDLESS):
-        return -1
-    plain = _is_plain(origins) and _is_plain(directions) and origins.shape == directions.shape
-    return len(origins) if plain else -1
+    if not (type(t_min) is type(t_max) is float and t_min == 0.0 and t_max == math.inf):
+        return False
+    return _is_plain(origins) and _is_plain(directions) and origins.shape == directions.shape
 
 
 def _is_plain(values: ArrayLike) -> TypeGuard[NDArray[np.float64]]:

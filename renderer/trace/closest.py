@@ -11,7 +11,7 @@ from renderer.jit.decorators import entry_of
 from renderer.mesh.mesh import Mesh
 from renderer.results.hits import Hits
 from renderer.system.threads import for_chunks
-from renderer.trace.batch import ALONE, CHUNK, INFINITY, NO_STARTS, ZERO, RayBatch, reject
+from renderer.trace.batch import ALONE, CHUNK, INFINITY, NO_STARTS, ZERO, RayBatch, count_rays, reject
 from renderer.trace.layout import BLOCK_FACES, Tree
 from renderer.trace.ray_lanes import WIDTH
 from renderer.trace.rays import HitArrays
@@ -33,77 +33,61 @@ _NO_T, _NO_FACE, _NO_HIT = np.empty(0), np.empty(0, np.int64), np.empty(0, np.bo
 _INT = np.dtype(np.int64)
 
 
-def closest_hits(tree: Tree, rays: RayBatch, mesh: Mesh, threads: int) -> Hits:
-    """Closest hits of a batch."""
-    count = rays.number
-    if is_small(tree, count):
-        return closest_at_once(tree, mesh, count, *rays)
-    t, u, v = np.empty(count), np.empty(count), np.empty(count)
-    face, side = np.empty(count, _INT), np.empty(count, _INT)
-    pile = None if rays.starts is NO_STARTS else np.empty(count, _INT)
-    found = HitArrays(t, face, u, v, side, side if pile is None else pile, _NO_HIT)
-    _run(tree, rays, count, found, threads, any_hit=None)
-    return Hits(t, face, u, v, mesh, None, side, pile)
-
-
-def any_hits(tree: Tree, rays: RayBatch, threads: int) -> NDArray[np.bool_]:
-    """Whether each ray of a batch hits anything."""
-    count = rays.number
-    if is_small(tree, count):
-        return any_at_once(tree, count, *rays)
-    hit = np.empty(count, np.bool_)
-    _run(tree, rays, count, HitArrays(_NO_T, _NO_FACE, _NO_T, _NO_T, _NO_FACE, _NO_FACE, hit), threads, any_hit=True)
-    return hit
-
-
-def is_small(tree: Tree, count: int) -> bool:
-    """Whether so many rays are traced at once, on the caller's thread."""
-    return 0 <= count <= _LEAST_CHUNK and tree.depth > 0
-
-
-def closest_at_once(
-    tree: Tree, mesh: Mesh, count: int, origins: Any, directions: Any,
+def closest_hits(
+    tree: Tree, mesh: Mesh, threads: int, origins: Floats, directions: Floats,
     t_min: Floats = ZERO, t_max: Floats = INFINITY, starts: Integers = NO_STARTS,
 ) -> Hits:  # fmt: skip
-    """Closest hits of a batch of ``count`` rays that ``is_small``, by its arrays."""
-    # Arrays of their own take less time to make than rows of one, which few rays notice.
+    """Closest hits of the rays in the arrays of a ``RayBatch``; few rays notice how long it takes to make one."""
+    count = count_rays(origins, directions)
+    # Arrays of their own take less time to make than rows of one.
     t, u, v = np.empty(count), np.empty(count), np.empty(count)
     face, side = np.empty(count, _INT), np.empty(count, _INT)
     # Rays that start on no surface come upon the face that they hit.
     pile = None if starts is NO_STARTS else np.empty(count, _INT)
     unread = side if pile is None else pile
-    if count <= FEW and tree.depth <= FEW_DEPTH:
-        _trace_few(tree, origins, directions, t_min, t_max, starts, t, face, u, v, side, unread)
+    if count <= FEW and 0 < tree.depth <= FEW_DEPTH:
+        row = _trace_few(tree, origins, directions, t_min, t_max, starts, t, face, u, v, side, unread)
     else:
-        _trace_at_once(
-            tree, count, origins, directions, t_min, t_max, starts, t, face, u, v, side, unread, _NO_HIT, None
-        )
+        own = ALONE if starts is NO_STARTS else starts
+        row = _trace(
+            tree, threads, count,
+            (tree.descriptor, origins, directions, t_min, t_max, own, t, face, u, v, side, unread, _NO_HIT, None),
+        )  # fmt: skip
+    if row >= 0:
+        reject(RayBatch(origins, directions, t_min, t_max), row, tree.scale)
     return Hits(t, face, u, v, mesh, None, side, pile)
 
 
-def any_at_once(
-    tree: Tree, count: int, origins: Any, directions: Any,
+def any_hits(
+    tree: Tree, threads: int, origins: Floats, directions: Floats,
     t_min: Floats = ZERO, t_max: Floats = INFINITY, starts: Integers = NO_STARTS,
-) -> NDArray[np.bool_]:  # fmt: skip
-    """Whether each ray of such a batch hits anything."""
-    if count <= FEW and tree.depth <= FEW_DEPTH:
+) -> Flags:  # fmt: skip
+    """Whether each of the rays in the arrays of a ``RayBatch`` hits anything."""
+    count = count_rays(origins, directions)
+    if count <= FEW and 0 < tree.depth <= FEW_DEPTH:
         unread, face, others = np.empty(count), np.empty(count, _INT), np.empty(count, _INT)
-        _trace_few(tree, origins, directions, t_min, t_max, starts, unread, face, unread, unread, others, others)
-        return face >= 0
-    hit = np.empty(count, np.bool_)
-    _trace_at_once(
-        tree, count, origins, directions, t_min, t_max, starts, _NO_T, _NO_FACE, _NO_T, _NO_T, _NO_FACE, _NO_FACE, hit,
-        True,
-    )  # fmt: skip
+        row = _trace_few(tree, origins, directions, t_min, t_max, starts, unread, face, unread, unread, others, others)
+        hit = face >= 0
+    else:
+        own, hit = ALONE if starts is NO_STARTS else starts, np.empty(count, np.bool_)
+        row = _trace(
+            tree, threads, count,
+            (tree.descriptor, origins, directions, t_min, t_max, own,
+             _NO_T, _NO_FACE, _NO_T, _NO_T, _NO_FACE, _NO_FACE, hit, True),
+        )  # fmt: skip
+    if row >= 0:
+        reject(RayBatch(origins, directions, t_min, t_max), row, tree.scale)
     return hit
 
 
 def _trace_few(
     tree: Tree, origins: Floats, directions: Floats, t_min: Floats, t_max: Floats, starts: Integers,
     t: Floats, face: Integers, u: Floats, v: Floats, side: Integers, pile: Integers,
-) -> None:  # fmt: skip
-    """Write the closest hits of a few rays."""
-    row = UNRESOLVED
+) -> int:  # fmt: skip
+    """Write the closest hits of a few rays, on the caller's thread; returns the row of the first out of range, or less
+    than 0.
+    """
+    row: int = UNRESOLVED
     if starts is NO_STARTS:
         row = entry_of(trace_few)(
             tree.descriptor, origins, directions, t_min, t_max, ALONE, t, face, u, v, side, pile, _NO_HIT
@@ -115,25 +99,7 @@ def _trace_few(
             holders_in(scratch),
         )  # fmt: skip
         _local.scratch = scratch
-    if row >= 0:
-        reject(RayBatch(origins, directions, t_min, t_max, starts), row, tree.scale)
-
-
-def _trace_at_once(
-    tree: Tree, count: int, origins: Floats, directions: Floats, t_min: Floats, t_max: Floats, starts: Integers,
-    t: Floats, face: Integers, u: Floats, v: Floats, side: Integers, pile: Integers, hit: Flags, any_hit: bool | None,
-) -> None:  # fmt: skip
-    """Write the hits of a small batch."""
-    own, scratch = ALONE if starts is NO_STARTS else starts, _take_scratch(tree.depth)
-    chunk, reached, following, waiting, row = entry_of(trace_chunk), 0, 0, 0, -1
-    while row < 0 and (reached < count or following < waiting):
-        reached, following, waiting, row = chunk(
-            tree.descriptor, origins, directions, t_min, t_max, own, t, face, u, v, side, pile, hit, any_hit, scratch,
-            reached, following, waiting, count,
-        )  # fmt: skip
-    _local.scratch = scratch
-    if row >= 0:
-        reject(RayBatch(origins, directions, t_min, t_max, starts), row, tree.scale)
+    return row
 
 
 def rays_against_blocks(tree: Tree) -> int:
@@ -141,20 +107,26 @@ def rays_against_blocks(tree: Tree) -> int:
     return max(1, _BLOCK_TESTS * BLOCK_FACES // max(1, len(tree.faces)))
 
 
-def _run(tree: Tree, rays: RayBatch, count: int, found: HitArrays, threads: int, any_hit: bool | None) -> None:
+def _trace(tree: Tree, threads: int, count: int, arrays: tuple[Any, ...]) -> int:
+    """Trace rays, in chunks on threads if they are many; returns the row of the first out of range, or -1.
+
+    ``arrays`` are the arguments of ``trace_chunk`` up to ``any_hit``.
+    """
+    bad: list[int] = []
+    if count <= _LEAST_CHUNK and tree.has_nodes:
+        for _ in _rounds(tree, arrays, 0, count, bad):
+            pass
+        return bad[0] if bad else -1
     size = min(CHUNK, max(_LEAST_CHUNK, count // (16 * threads)))
     if not tree.has_nodes:
         size = min(size, rays_against_blocks(tree))
-    bad: list[int] = []
 
     def trace(begin: int, end: int) -> Iterator[None]:
         # Only chunks after a bad ray are left out, so the first bad ray is always found.
-        if not bad or begin < bad[0]:
-            yield from find_range(tree, rays, found, any_hit, begin, end, bad)
+        return iter(()) if bad and bad[0] < begin else _rounds(tree, arrays, begin, end, bad)
 
     for_chunks(trace, count, size, threads)
-    if bad:
-        reject(rays, min(bad), tree.scale)
+    return min(bad, default=-1)
 
 
 def find_range(
@@ -165,7 +137,11 @@ def find_range(
     If a ray is out of range, append the row of the first to ``bad``.
     """
     own = ALONE if rays.starts is NO_STARTS else rays.starts
-    arrays = (tree.descriptor, *rays[:4], own, *found, any_hit)
+    return _rounds(tree, (tree.descriptor, *rays[:4], own, *found, any_hit), begin, end, bad)
+
+
+def _rounds(tree: Tree, arrays: tuple[Any, ...], begin: int, end: int, bad: list[int]) -> Iterator[None]:
+    """``find_range``, by the ``arrays`` of ``_trace``."""
     scratch, row = _take_scratch(tree.depth), -1
     if tree.has_nodes:
         chunk, reached, following, waiting = entry_of(trace_chunk), begin, 0, 0
@@ -180,7 +156,7 @@ def find_range(
 
 
 class _Local(threading.local):
-    """The scratch of a thread, kept from one chunk to the next: 100 kB."""
+    """The scratch of a thread, kept from one chunk to the next: 4 MB, of which most rays touch 100 kB."""
 
     scratch: Integers | None = None
 

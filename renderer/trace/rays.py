@@ -206,15 +206,15 @@ def _scaled(origin, direction, t_min, t_max, scale, slack, leaving, mask, ignore
     t_min = select(t_min > 0.0, maximum(t_min * scale, _TINIEST), t_min)
     dx, dy, dz = direction
     least = maximum(fabs(dx), maximum(fabs(dy), fabs(dz))) * FLATTEST
-    dx, dy, dz = _not_flat(dx, least), _not_flat(dy, least), _not_flat(dz, least)
+    dx, dy, dz = _or_zero(dx, least), _or_zero(dy, least), _or_zero(dz, least)
     ray = Ray(origin[0] * scale, origin[1] * scale, origin[2] * scale, dx, dy, dz, t_min, slack, leaving, mask, ignored)
     # A hit whose t is beyond the largest float64, in either unit, is none.
     return ray, minimum(minimum(t_max, _MOST) * scale, _MOST)
 
 
 @inlined
-def _not_flat(x, least):
-    """A component of a direction, or a zero of its sign."""
+def _or_zero(x, least):
+    """A component of a direction; a zero of its sign if it is below ``least``."""
     return select(fabs(x) < least, x * 0.0, x)
 
 

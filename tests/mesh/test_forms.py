@@ -124,11 +124,11 @@ def test_what_is_no_mesh_of_another_library_is_said() -> None:
         bad(SimpleNamespace(vertices=[1, 2], faces=[]))
 
 
-def test_trimesh_is_not_imported_for_its_meshes() -> None:
-    code = (
-        "import sys, types, numpy as np; from renderer import Mesh; "
-        "Mesh.from_trimesh(types.SimpleNamespace(vertices=np.eye(3), faces=[[0, 1, 2]])); "
-        "sys.exit('trimesh' in sys.modules)"
-    )
+@cases(("made", "module"), [
+    ("renderer.Mesh.from_trimesh(types.SimpleNamespace(vertices=np.eye(3), faces=[[0, 1, 2]]))", "trimesh"),
+    ("renderer.Octree", "renderer.mesh.load"),
+])  # fmt: skip
+def test_what_is_not_needed_is_not_imported(made: str, module: str) -> None:
+    code = f"import sys, types, numpy as np, renderer; {made}; sys.exit({module!r} in sys.modules)"
     folder = Path(renderer.__file__).parent.parent
     assert subprocess.run([sys.executable, "-c", code], cwd=folder, check=False).returncode == 0

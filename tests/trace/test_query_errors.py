@@ -10,6 +10,7 @@ from cases import cases
 from renderer.errors import MeshError
 from renderer.mesh.shapes import icosphere
 from renderer.octree import BruteForce, Octree
+from renderer.trace import closest
 
 pytestmark = pytest.mark.judges("BruteForce", "Octree", "Octree.any_hit", "Octree.closest_hit", "Octree.from_mesh")
 
@@ -61,6 +62,19 @@ def test_the_first_bad_row_is_named_in_a_batch_of_any_size(query: Any) -> None:
     for origins, bad, row in (few, (with_row(2, np.nan), directions, 1), some, (GOOD[0], many, 99_999)):
         with pytest.raises(ValueError, match=rf"^directions: .* in row {row}$"):
             query(origins, bad)
+
+
+@cases("query", ["closest_hit", "any_hit"])
+def test_the_first_bad_row_is_named_if_a_later_chunk_ends_first(query: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def backwards(work: Any, count: int, size: int, threads: int) -> None:
+        for begin in reversed(range(0, count, size)):
+            list(work(begin, min(begin + size, count)))
+
+    monkeypatch.setattr(closest, "for_chunks", backwards)
+    directions = np.ones((20_000, 3))
+    directions[[7, 19_999]] = 0
+    with pytest.raises(ValueError, match=r"^directions: .* in row 7$"):
+        getattr(ACCELERATORS[0], query)(np.ones((20_000, 3)), directions)
 
 
 @cases("query", QUERIES)

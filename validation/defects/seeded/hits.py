@@ -41,19 +41,28 @@ def _refit_in_old_units(sound: Any, tree: Any, vertices: Any, faces: Any, scale:
     return sound(tree, vertices, faces, tree.scale, threads)
 
 
-def _any_beyond_one(sound: Any, tree: Any, rays: Any, threads: int) -> Any:
-    return sound(tree, rays._replace(t_min=np.maximum(rays.t_min, 1.0)), threads)
+def _any_beyond_one(sound: Any, tree: Any, threads: int, *arrays: Any) -> Any:
+    from renderer.trace.batch import RayBatch
+
+    rays = RayBatch(*arrays)
+    return sound(tree, threads, *rays._replace(t_min=np.maximum(rays.t_min, 1.0)))
 
 
-def _closest_but_last_of_chunks(sound: Any, tree: Any, rays: Any, *rest: Any) -> Any:
+def _closest_but_last_of_chunks(sound: Any, tree: Any, mesh: Any, threads: int, *arrays: Any) -> Any:
+    from renderer.trace.batch import RayBatch
+
+    rays = RayBatch(*arrays)
     ends = np.broadcast_to(rays.t_max, rays.number).copy()
     ends[8191::8192] = 0.0
-    return sound(tree, rays._replace(t_max=ends), *rest)
+    return sound(tree, mesh, threads, *rays._replace(t_max=ends))
 
 
-def _few_an_ulp_farther(sound: Any, tree: Any, rays: Any, t: Any, *others: Any) -> None:
-    sound(tree, rays, t, *others)
+def _few_an_ulp_farther(
+    sound: Any, tree: Any, origins: Any, directions: Any, t_min: Any, t_max: Any, starts: Any, t: Any, *others: Any
+) -> int:
+    row = sound(tree, origins, directions, t_min, t_max, starts, t, *others)
     t *= 1.0 + 2.0**-52
+    return int(row)
 
 
 def _points_moved(sound: Any, mesh: Any, face: Any, u: Any, v: Any) -> Any:

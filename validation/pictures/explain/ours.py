@@ -58,7 +58,7 @@ class Ours:
             found = (self.steps.meet(_free(o, d)) for o, d in zip(origins, directions, strict=True))
             return np.array([-1 if met is None else met.together.seen.face for met in found], np.int64)
         rays, _ = check_rays(origins, directions, 0.0, np.inf)
-        return np.asarray(closest_hits(self.steps.prepared.tree, rays, self.steps.prepared.mesh, 1).face)
+        return np.asarray(closest_hits(self.steps.prepared.tree, self.steps.prepared.mesh, 1, *rays).face)
 
     def hidden(self, origins: NDArray[np.float64], directions: NDArray[np.float64], length: float) -> NDArray[np.bool_]:
         """Whether rays hit anything within a length."""
@@ -71,7 +71,7 @@ class Ours:
             )
             return np.array([self._arriving(aim)[1] >= 0 for aim in aims])
         rays, _ = check_rays(origins, directions, 0.0, length)
-        return np.asarray(closest_hits(self.steps.prepared.tree, rays, self.steps.prepared.mesh, 1).hit)
+        return np.asarray(closest_hits(self.steps.prepared.tree, self.steps.prepared.mesh, 1, *rays).hit)
 
     def _follow(self, ray: Ray, share: Vector) -> Node:
         met = self.steps.meet(ray)
