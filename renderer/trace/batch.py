@@ -12,6 +12,7 @@ from renderer.arguments.limits import FARTHEST, LONGEST, SHORTEST
 from renderer.arguments.types import ArrayLike
 from renderer.errors import expect
 from renderer.mesh.mesh import Mesh
+from renderer.system.spare import recycled
 from renderer.system.threads import for_chunks
 from renderer.trace.spawn import FARTHEST_START, offset_from_faces
 from renderer.trace.starts.record import ALL, FACE, FACES, HEAD, IGNORED, MASK, ROW, ROW_STEP, VERTICES
@@ -219,7 +220,7 @@ def whole_numbers(argument: str, values: ArrayLike, shape: tuple[int, ...]) -> N
 
 def make_starts(count: int, mesh: Mesh) -> NDArray[np.int64]:
     """Starts of rays as in ``starts.record``, on a mesh that the caller keeps; rows follow HEAD, not yet written."""
-    starts = np.empty(HEAD + ROW * count, np.int64)
+    starts = recycled(HEAD + ROW * count, np.int64)
     starts[ROW_STEP], starts[VERTICES], starts[FACES] = ROW, mesh.vertices.ctypes.data, mesh.faces.ctypes.data
     return starts
 
@@ -244,11 +245,11 @@ def offset_origins(rays: RayBatch, leaving: Leaving, mesh: Mesh, scale: float, t
     Raises ``ValueError`` naming the argument and the row for an origin out of bounds or not on its face.
     """
     count = rays.number
-    sound = (np.abs(rays.origins) <= FARTHEST / scale).all(axis=1) & np.isfinite(rays.directions).all(axis=1)
-    if not sound.all():
+    near, finite = np.abs(rays.origins) <= FARTHEST / scale, np.isfinite(rays.directions)
+    if not (near.all() and finite.all()):
         # Rejected before it is moved, so that the message names the numbers as given.
-        reject(rays, int((~sound).argmax()), scale)
-    origins, starts, bad = np.empty((count, 3)), make_starts(count, mesh), list[int]()
+        reject(rays, int((~(near & finite).all(axis=1)).argmax()), scale)
+    origins, starts, bad = recycled(3 * count).reshape(count, 3), make_starts(count, mesh), list[int]()
     rows, corners = starts[HEAD:].view(np.float64).reshape(count, ROW), (mesh.vertices, mesh.faces)
 
     def leave(begin: int, end: int) -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from renderer.jit.decorators import entry_of
 from renderer.mesh.mesh import Mesh
 from renderer.results.hits import Hits
+from renderer.system.spare import recycled
 from renderer.system.threads import for_chunks
 from renderer.trace.batch import ALONE, CHUNK, INFINITY, NO_STARTS, ZERO, RayBatch, count_rays, reject
 from renderer.trace.layout import BLOCK_FACES, Tree
@@ -40,10 +41,11 @@ def closest_hits(
     """Closest hits of the rays in the arrays of a ``RayBatch``; few rays notice how long it takes to make one."""
     count = count_rays(origins, directions)
     # Arrays of their own take less time to make than rows of one.
-    t, u, v = np.empty(count), np.empty(count), np.empty(count)
-    face, side = np.empty(count, _INT), np.empty(count, _INT)
+    new = np.empty if count <= _LEAST_CHUNK else recycled
+    t, u, v = new(count), new(count), new(count)
+    face, side = new(count, _INT), new(count, _INT)
     # Rays that start on no surface come upon the face that they hit.
-    pile = None if starts is NO_STARTS else np.empty(count, _INT)
+    pile = None if starts is NO_STARTS else new(count, _INT)
     unread = side if pile is None else pile
     if count <= FEW and 0 < tree.depth <= FEW_DEPTH:
         row = _trace_few(tree, origins, directions, t_min, t_max, starts, t, face, u, v, side, unread)
@@ -69,7 +71,7 @@ def any_hits(
         row = _trace_few(tree, origins, directions, t_min, t_max, starts, unread, face, unread, unread, others, others)
         hit = face >= 0
     else:
-        own, hit = ALONE if starts is NO_STARTS else starts, np.empty(count, np.bool_)
+        own, hit = ALONE if starts is NO_STARTS else starts, recycled(count, np.bool_)
         row = _trace(
             tree, threads, count,
             (tree.descriptor, origins, directions, t_min, t_max, own,

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.results.hits import AllHits, Hits
+from renderer.system.spare import recycled
 from renderer.system.threads import for_chunks
 from renderer.trace.batch import CHUNK, RayBatch
 from renderer.trace.error_bounds import bound_errors
@@ -31,7 +32,7 @@ def errors_of(
     threads: int,
 ) -> NDArray[np.float64]:
     """The bounds of ``add_errors`` for hits at t on faces of a mesh, nan for face -1."""
-    errors, own = np.empty(len(t)), np.empty(0, np.int64) if rows is None else rows
+    errors, own = recycled(len(t)), np.empty(0, np.int64) if rows is None else rows
 
     def bound(begin: int, end: int) -> None:
         bound_errors(mesh.vertices, mesh.faces, rays, own, t, face, errors, begin, end, scale)

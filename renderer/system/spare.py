@@ -1,0 +1,62 @@
+"""Memory of large answers, used again when nobody holds them: new pages take the system as long as a part of the rays.
+
+Each array has a block of its own, so that who keeps one of an answer's arrays keeps no other alive.
+"""
+
+from collections import deque
+from sys import getrefcount
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Smaller arrays are at hand in ``malloc``, which takes larger ones from the system each time.
+_LEAST = 1 << 17
+# The most bytes of all blocks that are kept, in use or not: the answers of a million rays and a half.
+MOST = 1 << 26
+# A block serves arrays of at least so much of it, because who holds such an array holds the block.
+_LEAST_SHARE = 0.5
+
+_blocks: deque[NDArray[np.uint8]] = deque()
+_held = [np.empty(0, np.uint8)]
+_UNUSED = getrefcount(_held[0])
+
+
+def recycled(count: int, dtype: Any = np.float64) -> NDArray[Any]:
+    """``np.empty(count, dtype)``, perhaps in the memory of an earlier one that nobody holds any more."""
+    size = count * np.dtype(dtype).itemsize
+    if not _LEAST <= size <= MOST:
+        return np.empty(count, dtype)
+    block = _unused(size)
+    array: NDArray[Any] = block[:size].view(dtype)
+    # Only now, when the array counts as its user, may another thread find the block.
+    _blocks.append(block)
+    _forget_oldest()
+    return array
+
+
+def _unused(size: int) -> NDArray[np.uint8]:
+    """A block of ``size`` bytes or some more, which is in ``_blocks`` no longer."""
+    for _ in range(len(_blocks)):
+        try:
+            held = [_blocks.popleft()]
+        except IndexError:  # other threads have the rest
+            break
+        # rule: unused-memory
+        if getrefcount(held[0]) == _UNUSED and _LEAST_SHARE * held[0].nbytes <= size <= held[0].nbytes:
+            return held[0]
+        _blocks.append(held[0])
+    return np.empty(size, np.uint8)
+
+
+def _forget_oldest() -> None:
+    blocks = list(_blocks)
+    excess = sum(block.nbytes for block in blocks) - MOST
+    for block in blocks:
+        if excess <= 0:
+            break
+        excess -= block.nbytes
+        try:
+            _blocks.popleft()
+        except IndexError:
+            break
