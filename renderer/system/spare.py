@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 # Smaller arrays are at hand in ``malloc``, which takes larger ones from the system each time.
 _LEAST = 1 << 17
-# The most bytes of all blocks that are kept, in use or not: the answers of a million rays and a half.
-MOST = 1 << 26
+# The most bytes of all blocks that are kept, in use or not: two answers for a million rays and a half.
+MOST = 1 << 27
 # A block serves arrays of at least so much of it, because who holds such an array holds the block.
 _LEAST_SHARE = 0.5
 
