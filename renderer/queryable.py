@@ -3,7 +3,7 @@
 from __future__ import annotations  # so that help() shows ArrayLike by its name
 
 import warnings
-from typing import Any, Literal, NamedTuple, cast
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,7 +142,7 @@ class Queries:
         built = self._built
         # In one step, because a call with one ray would spend most of its time on the others.
         if leaving is side is None and t_error is False and are_plain(origins, directions, t_min, t_max):
-            return closest_hits(built.tree, built.mesh, self.threads, cast(Any, origins), cast(Any, directions))
+            return closest_hits(built.tree, built.mesh, self.threads, origins, directions)  # type: ignore[arg-type]
         rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving, side)
         hits = closest_hits(built.tree, built.mesh, self.threads, *rays)
         if t_error is not False and flag_argument("t_error", t_error):
@@ -179,7 +179,7 @@ class Queries:
         """
         built = self._built
         if leaving is side is None and are_plain(origins, directions, t_min, t_max):
-            return any_hits(built.tree, self.threads, cast(Any, origins), cast(Any, directions))
+            return any_hits(built.tree, self.threads, origins, directions)  # type: ignore[arg-type]
         rays, shape = self._rays(built, origins, directions, t_min, t_max, leaving, side)
         return any_hits(built.tree, self.threads, *rays).reshape(shape)
 

@@ -180,9 +180,14 @@ def are_plain(origins: Any, directions: Any, t_min: Any, t_max: Any) -> bool:
 
     Few rays notice how long this takes.
     """
-    if not (type(t_min) is type(t_max) is float and t_min == 0.0 and t_max == math.inf):
+    if not (type(origins) is type(directions) is np.ndarray and type(t_min) is type(t_max) is float):
         return False
-    return _is_plain(origins) and _is_plain(directions) and origins.shape == directions.shape
+    shape = origins.shape
+    if not (origins.dtype is directions.dtype is _FLOAT64 and len(shape) == 2 and shape[1] == 3):
+        return False
+    if not (shape == directions.shape and t_min == 0.0 and t_max == math.inf):
+        return False
+    return origins.flags.carray and directions.flags.carray
 
 
 def _is_plain(values: ArrayLike) -> TypeGuard[NDArray[np.float64]]:

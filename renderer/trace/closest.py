@@ -91,9 +91,7 @@ def _trace_few(
     """
     row: int = UNRESOLVED
     if starts is NO_STARTS:
-        row = entry_of(trace_few)(
-            tree.descriptor, origins, directions, t_min, t_max, ALONE, t, face, u, v, side, pile, _NO_HIT
-        )
+        row = entry_of(trace_few)(tree.descriptor, origins, directions, t_min, t_max, t, face, u, v, side)
     if row == UNRESOLVED:
         scratch, own = _take_scratch(tree.depth), ALONE if starts is NO_STARTS else starts
         row = trace_carefully(

@@ -83,11 +83,11 @@ class HitPointers(NamedTuple):
 
 @inlined
 def ray_pointers(origins, directions, t_min, t_max, starts, scale):
-    """``RayPointers`` of the arrays of a ``RayBatch``."""
+    """``RayPointers`` of the arrays of a ``RayBatch``; ``starts`` are pointers."""
     return RayPointers(
         pointer(origins), pointer(directions), pointer(t_min), pointer(t_max),
         3 * np.int64(len(origins) > 1), 3 * np.int64(len(directions) > 1), np.int64(len(t_min) > 1),
-        np.int64(len(t_max) > 1), scale, start_pointers(starts),
+        np.int64(len(t_max) > 1), scale, starts,
     )  # fmt: skip
 
 
@@ -95,7 +95,7 @@ def ray_pointers(origins, directions, t_min, t_max, starts, scale):
 def batch_pointers(rays, scale):
     """``RayPointers`` of a ``RayBatch``."""
     origins, directions, t_min, t_max, starts = rays
-    return ray_pointers(origins, directions, t_min, t_max, starts, scale)
+    return ray_pointers(origins, directions, t_min, t_max, start_pointers(starts), scale)
 
 
 @inlined

@@ -6,15 +6,25 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.kinds import of_none
-from renderer.numerics.simd import LOCAL_WORDS, is_negative, load, local_words, offset, pointer, store
+from renderer.numerics.simd import (
+    LOCAL_WORDS,
+    address,
+    bool_pointer,
+    is_negative,
+    load,
+    local_words,
+    offset,
+    pointer,
+    store,
+)
 from renderer.trace.best import NO_FACE, Best, no_hit
 from renderer.trace.intersect import largest_of, make_shear
 from renderer.trace.leaf import nearest_carefully, nearest_in_blocks
-from renderer.trace.rays import first_bad_ray, ray_at, write_hit
+from renderer.trace.rays import HitPointers, first_bad_ray, ray_at, ray_pointers, write_hit
 from renderer.trace.single_ray import Found, SingleRay, enter_counted, prepare_single, push_entered
 from renderer.trace.starts.record import PILE
 from renderer.trace.starts.search import is_near_start, search_from, t_from
-from renderer.trace.trees import call_pointers
+from renderer.trace.trees import call_pointers, tree_pointers
 from renderer.trace.walk import always, stack_size, walk_nearest_first
 
 # What ``trace_few`` returns where a hit is uncertain.
@@ -123,15 +133,18 @@ def _visit_certainly(tree, query, first, count, found):
 
 
 @kernel
-def trace_few(descriptor, origins, directions, t_min, t_max, starts, t, face, u, v, side, pile, hit):
-    """Closest hits of a few rays of a ``RayBatch``, none of which starts on the surface, one by one, to the arrays of a
+def trace_few(descriptor, origins, directions, t_min, t_max, t, face, u, v, side):
+    """Closest hits of a few rays of a ``RayBatch``, none of which starts on the surface, one by one, to arrays as of a
     ``HitArrays``. The tree has at most FEW_DEPTH levels.
 
     Returns the row of the first ray out of range, for which nothing is traced; UNRESOLVED where ``trace_carefully`` has
     to trace them, for which most processes need not compile what resolves hits; or -1.
     """
-    call = call_pointers(descriptor, origins, directions, t_min, t_max, starts, t, face, u, v, side, pile, hit)
-    (tree, source, found), count = call, len(t)
+    # Each array that Python passes takes a tenth of a microsecond, so none comes that is not needed.
+    tree, count = tree_pointers(descriptor), len(t)
+    source = ray_pointers(origins, directions, t_min, t_max, None, tree.scale)
+    sides, no_bools = pointer(side), bool_pointer(address(side))
+    found = HitPointers(pointer(t), pointer(face), pointer(u), pointer(v), sides, sides, no_bools)
     bad = first_bad_ray(source, 0, count)
     if bad >= 0:
         return bad

@@ -13,7 +13,7 @@ from renderer.trace.layout import BLOCK_COUNT, BLOCKS, DEPTH, FACES, NODES, SCAL
 from renderer.trace.packet import trace_packet
 from renderer.trace.rays import HitPointers, RayPointers, found_pointers, ray_pointers
 from renderer.trace.single_ray import enter_node_of_tree
-from renderer.trace.starts.record import corners_of_mesh
+from renderer.trace.starts.record import corners_of_mesh, start_pointers
 from renderer.trace.stream import begin_in_tree, node_in_tree, resume_in_tree
 from renderer.trace.walk import boxes_of_node, child_of_node
 from renderer.trace.ways import Ways
@@ -70,7 +70,7 @@ class Call(NamedTuple):
 def call_pointers(descriptor, origins, directions, t_min, t_max, starts, t, face, u, v, side, pile, hit):
     """The ``Call`` with the arrays of a ``RayBatch`` and those of a ``HitArrays``."""
     tree = tree_pointers(descriptor)
-    rays = ray_pointers(origins, directions, t_min, t_max, starts, tree.scale)
+    rays = ray_pointers(origins, directions, t_min, t_max, start_pointers(starts), tree.scale)
     return Call(tree, rays, found_pointers(t, face, u, v, side, pile, hit))
 
 
