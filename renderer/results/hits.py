@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from renderer.mesh.mesh import Mesh, face_normals
 from renderer.results.attributes import Attributes
 
+# The rows that are worked on at once, so that what is computed on the way stays in the caches.
+_ROWS = 1 << 14
+
 
 class Passage(NamedTuple):
     """Where rays have gone through faces: ``Hits.through`` makes it, ``leaving`` takes it.
@@ -160,8 +163,11 @@ class Hits(Attributes):
         array([[0.5 , 0.25, 1.  ],
                [ nan,  nan,  nan]])
         """
-        points = np.full((*self.face.shape, 3), np.nan)
         hit = self.hit
+        if hit.all():
+            flat = (values.reshape(-1) for values in (self.face, self.u, self.v))
+            return points_on(self._mesh, *flat).reshape(*hit.shape, 3)
+        points = np.full((*hit.shape, 3), np.nan)
         points[hit] = points_on(self._mesh, self.face[hit], self.u[hit], self.v[hit])
         return points
 
@@ -177,8 +183,10 @@ class Hits(Attributes):
         array([[ 0.,  0.,  1.],
                [nan, nan, nan]])
         """
-        normals = np.full((*self.face.shape, 3), np.nan)
         hit = self.hit
+        if hit.all():
+            return _normals(self._mesh, self.face.reshape(-1)).reshape(*hit.shape, 3)
+        normals = np.full((*hit.shape, 3), np.nan)
         normals[hit] = _normals(self._mesh, self.face[hit])
         return normals
 
@@ -283,6 +291,16 @@ def points_on(
     mesh: Mesh, face: NDArray[np.int64], u: NDArray[np.float64], v: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """The points (k, 3) of faces at barycentrics u and v."""
+    points = np.empty((len(face), 3))
+    for begin in range(0, len(face), _ROWS):
+        rows = slice(begin, begin + _ROWS)
+        points[rows] = _some_points(mesh, face[rows], u[rows], v[rows])
+    return points
+
+
+def _some_points(
+    mesh: Mesh, face: NDArray[np.int64], u: NDArray[np.float64], v: NDArray[np.float64]
+) -> NDArray[np.float64]:
     corners, vertices = mesh.faces.take(face, axis=0), mesh.vertices
     # Corner by corner and in place: a third of the time of one sum of all.
     points = vertices.take(corners[:, 0], axis=0)
@@ -295,4 +313,11 @@ def points_on(
 
 
 def _normals(mesh: Mesh, face: NDArray[np.int64]) -> NDArray[np.float64]:
-    return face_normals(mesh.vertices[mesh.faces[face]])
+    # Each face once, where that is less.
+    if len(face) > len(mesh.faces):
+        return mesh.face_normals().take(face, axis=0)
+    normals = np.empty((len(face), 3))
+    for begin in range(0, len(face), _ROWS):
+        rows = slice(begin, begin + _ROWS)
+        normals[rows] = face_normals(mesh.vertices[mesh.faces[face[rows]]])
+    return normals

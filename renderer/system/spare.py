@@ -42,7 +42,6 @@ def _unused(size: int) -> NDArray[np.uint8]:
             held = [_blocks.popleft()]
         except IndexError:  # other threads have the rest
             break
-        # rule: unused-memory
         if getrefcount(held[0]) == _UNUSED and _LEAST_SHARE * held[0].nbytes <= size <= held[0].nbytes:
             return held[0]
         _blocks.append(held[0])
