@@ -8,6 +8,7 @@ import builtins
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 _MARK = re.compile(r"^\s*# rule: (\S+)$")
@@ -45,12 +46,7 @@ class Place:
 
 def find_rule(package: Path, name: str) -> Place:
     """The statement that carries a name. Raises ``ValueError`` unless one does."""
-    places = [
-        place
-        for path in _files(package, f"# rule: {name}\n")
-        for place in _marked(path, package)
-        if place.name.endswith(f": {name}")
-    ]
+    places = [place for path in _files(package, f"# rule: {name}\n") for place in _marked(path, package, name)]
     return _one(places, "rule", name)
 
 
@@ -69,6 +65,7 @@ def find_definition(package: Path, name: str) -> Place:
     places = [
         place
         for path in _files(package, last)
+        if last in _names_in(path.read_text(encoding="utf-8"))[0]
         for place in _defined(path, package)
         if f".{place.name}".endswith(f".{name}")
     ]
@@ -78,18 +75,18 @@ def find_definition(package: Path, name: str) -> Place:
 def find_name(package: Path, name: str) -> tuple[str, str]:
     """Module and name within it of a definition; or, where no definition has that name, of what a module imports."""
     last = name.rpartition(".")[2]
-    imported = [
+    importing = [
         module
         for path in _files(package, last)
         if f".{(module := module_of(path, package))}.{last}".endswith(f".{name}")
-        for node in ast.parse(path.read_text(encoding="utf-8")).body
-        if isinstance(node, ast.ImportFrom) and last in _bound(node)
+        for imported in _names_in(path.read_text(encoding="utf-8"))[1]
+        if imported == last
     ]
     try:
         found = find_definition(package, name)
     except ValueError:
-        if len(imported) == 1:
-            return imported[0], last
+        if len(importing) == 1:
+            return importing[0], last
         raise
     return found.module, found.name.removeprefix(f"{found.module}.")
 
@@ -111,33 +108,47 @@ def _one(places: list[Place], what: str, name: str) -> Place:
     return places[0]
 
 
-def _marked(path: Path, package: Path) -> Iterator[Place]:
-    """Each marked statement of a file."""
+def _marked(path: Path, package: Path, name: str) -> Iterator[Place]:
+    """Each statement of a file that carries a name."""
     text = path.read_text(encoding="utf-8")
     tree, module, lines = ast.parse(text), module_of(path, package), text.splitlines()
-    compiled = {id(node) for function in tree.body if _is_compiled(function) for node in ast.walk(function)}
     for number, line in enumerate(lines, 1):
-        if mark := _MARK.match(line):
+        if (mark := _MARK.match(line)) and mark[1] == name:
             below = (node for node in ast.walk(tree) if isinstance(node, ast.stmt) and node.lineno > number)
             # Of an ``if`` and what is in its line, the outer one is met first.
             node = min(below, key=lambda node: node.lineno)
-            yield Place(path, module, f"{module}: {mark[1]}", tree, node, id(node) in compiled)
+            compiled = (inner for function in tree.body if _is_compiled(function) for inner in ast.walk(function))
+            yield Place(path, module, f"{module}: {name}", tree, node, any(inner is node for inner in compiled))
 
 
 def _defined(path: Path, package: Path) -> Iterator[Place]:
     """Each function, class, method and constant of a file."""
     tree, module = ast.parse(path.read_text(encoding="utf-8")), module_of(path, package)
+    for name, node in _named(tree.body, module):
+        # Constants count as parts of kernels, which may read them.
+        compiled = isinstance(node, ast.Assign | ast.AnnAssign) or _is_compiled(node)
+        yield Place(path, module, name, tree, node, compiled)
 
-    def within(body: list[ast.stmt], prefix: str) -> Iterator[Place]:
-        for node in body:
-            if isinstance(node, ast.FunctionDef | ast.ClassDef):
-                yield Place(path, module, f"{prefix}.{node.name}", tree, node, _is_compiled(node))
-                yield from within(node.body, f"{prefix}.{node.name}")
-            elif isinstance(node, ast.Assign | ast.AnnAssign):
-                # Constants count as parts of kernels, which may read them.
-                yield from (Place(path, module, f"{prefix}.{name}", tree, node, True) for name in _bound(node))
 
-    yield from within(tree.body, module)
+def _named(body: list[ast.stmt], prefix: str) -> Iterator[tuple[str, ast.stmt]]:
+    """The dotted name and the node of each function, class, method and constant."""
+    for node in body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            yield f"{prefix}.{node.name}", node
+            yield from _named(node.body, f"{prefix}.{node.name}")
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            yield from ((f"{prefix}.{name}", node) for name in _bound(node))
+
+
+@cache
+def _names_in(text: str) -> tuple[frozenset[str], list[str]]:
+    """The last parts of the names that a source defines, and the names that its top imports from elsewhere."""
+    body = ast.parse(text).body
+    imports = [node for node in body if isinstance(node, ast.ImportFrom)]
+    return (
+        frozenset(name.rpartition(".")[2] for name, _ in _named(body, "")),
+        [name for node in imports for name in _bound(node)],
+    )
 
 
 def _is_compiled(node: ast.stmt) -> bool:
@@ -172,3 +183,4 @@ def _put(tree: ast.Module, node: ast.stmt, statements: tuple[ast.stmt, ...]) -> 
             if isinstance(body, list) and any(inner is node for inner in body):
                 at = next(i for i, inner in enumerate(body) if inner is node)
                 body[at : at + 1] = statements
+                return

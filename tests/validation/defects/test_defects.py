@@ -6,9 +6,10 @@ import json
 import os
 import subprocess
 import sys
-from functools import reduce
+from functools import cache, reduce
 from importlib import import_module
 from pathlib import Path
+from types import CodeType
 from typing import Any
 
 import pytest
@@ -62,6 +63,11 @@ def tiny(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> defects.Modules:
     return defects.Modules("tiny", "tiny")
 
 
+@cache
+def compiled(path: Path) -> CodeType:
+    return compile(path.read_bytes(), "", "exec")
+
+
 def python(program: str, cache: Path) -> subprocess.CompletedProcess[str]:
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
     return subprocess.run(
@@ -76,7 +82,7 @@ class TestSeam:
             assert find_name(PACKAGE, defect.change.name)
             return
         altered = defect.change.altered(PACKAGE)
-        assert compile(altered.text, altered.path.name, "exec") != compile(altered.path.read_bytes(), "", "exec")
+        assert compile(altered.text, altered.path.name, "exec") != compiled(altered.path)
 
     @pytest.mark.parametrize(
         "change", [d.change for d in DEFECTS if isinstance(d.change, Wrapped)], ids=lambda c: c.name
