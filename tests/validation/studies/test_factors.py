@@ -1,4 +1,6 @@
-"""The judges of view factors: ours passes, and each kind of wrong answer is noticed."""
+"""The judges of view factors notice each kind of wrong answer. That ours passes them all is seen where the section on
+studies runs.
+"""
 
 from dataclasses import replace
 
@@ -83,8 +85,7 @@ def test_closed_forms_hold_and_see_what_is_more_than_allowed(monkeypatch, name):
 
 
 @cases("name", points.CHECKS)
-def test_points_hold_and_see_a_half(monkeypatch, name):
-    assert points.check(name, True)["share_of_allowed"] <= 1.0
+def test_points_see_a_half(monkeypatch, name):
     own = points.view_factors_from
 
     def more(*given, **options):
@@ -96,18 +97,16 @@ def test_points_hold_and_see_a_half(monkeypatch, name):
 
 
 @cases("name", rooms.ROOMS)
-def test_embree_agrees_and_sees_a_thirtieth(monkeypatch, name):
-    row = embree.check(name, True)
-    assert row["apart"] <= embree.ERRORS
+def test_embree_sees_a_thirtieth(monkeypatch, name):
     wrong(embree, monkeypatch, lambda found: scaled(found, 0.97))
     assert embree.check(name, True)["apart"] > embree.ERRORS
 
 
 @cases("name", errors.FORMS)
-def test_errors_fall_and_are_stated(monkeypatch, name):
+def test_errors_that_do_not_fall_or_are_not_stated_are_seen(monkeypatch, name):
     monkeypatch.setattr(errors, "_QUICK", errors._QUICK[:3])
-    row = errors.check(name, True)
-    assert row["slope"] <= errors.SLOPE and row["ratio"] <= errors.HONEST
+    few = errors.FORMS[name]()[:3]
+    monkeypatch.setitem(errors.FORMS, name, lambda: few)
     wrong(errors, monkeypatch, lambda found: replace(scaled(found, 1.05), errors=found.errors * 0.5))
     row = errors.check(name, True)
     assert row["slope"] > errors.SLOPE and row["ratio"] > errors.HONEST
@@ -145,7 +144,6 @@ BROKEN = {
 
 @cases("name", BROKEN)
 def test_what_does_not_hold_is_counted(monkeypatch, name):
-    assert laws.check(name)["wrong"] == 0
     wrong(laws, monkeypatch, BROKEN[name])
     row = laws.check(name)
     assert 0 < row["wrong"] <= row["asked"]
@@ -156,14 +154,12 @@ HEAT = ["heat of two surfaces", "heat of a room"]
 
 @cases("name", HEAT)
 def test_heat_that_does_not_hold_is_counted(monkeypatch, name):
-    assert laws.check(name)["wrong"] == 0
     wrong(heat, monkeypatch, lambda found: scaled(found, 0.99))
     assert laws.check(name)["wrong"] > 0
 
 
 @cases("name, option", [("a column in a room", "max_rays"), ("view factors by any threads", "threads")])
 def test_laws_that_compare_two_answers_count_their_difference(monkeypatch, name, option):
-    assert laws.check(name)["wrong"] == 0
     own, calls = laws.view_factors, []
 
     def other(*given, **options):

@@ -1,5 +1,6 @@
 """The judges of radiosity pass a sound renderer and notice broken ones."""
 
+from functools import cache
 from types import ModuleType
 from typing import Any
 
@@ -8,12 +9,20 @@ import pytest
 
 from validation.defects.changes import Wrapped
 from validation.defects.seeded.lit import LIT
-from validation.studies.lit import judge
+from validation.studies.lit import judge, scenes
+
+
+@cache
+def random_paths() -> Any:
+    """Mitsuba's picture of the room, which is the same in each test."""
+    return judge.global_light.global_light(scenes.room(), judge._SIZE, judge._SIZE, judge._QUICK_PATHS)
 
 
 @pytest.fixture
 def room(mitsuba: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(judge, "LIT", {"a room by radiosity": judge.LIT["a room by radiosity"]})
+    drawn = random_paths()
+    monkeypatch.setattr(judge.global_light, "global_light", lambda *_: drawn)
 
 
 def failed(record: dict[str, Any]) -> list[str]:

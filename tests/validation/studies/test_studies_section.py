@@ -9,6 +9,8 @@ from renderer.studies.points import Chosen, Points
 from validation.job import Job
 from validation.report import chapters, figures
 from validation.studies import bits, bodies, corners, forms, holds, section
+from validation.studies.factors import errors
+from validation.studies.lit import judge
 from validation.thresholds import Thresholds
 
 
@@ -20,6 +22,8 @@ def run(tmp_path_factory):
         patch.setattr(section, "_QUICK", (150, 16))
         patch.setattr(corners, "_QUICK", 40)
         patch.setattr(corners, "_SAMPLE", 40)
+        patch.setattr(errors, "_QUICK", errors._QUICK[:3])
+        patch.setattr(judge, "_RTOL", 0.05)
         record, gates = section.run(job)
     assert len(taken) == section.steps(job)
     return record, gates, job.folder
@@ -151,6 +155,8 @@ BROKEN = {
 def test_what_does_not_hold_is_counted(monkeypatch, name):
     study, broken = BROKEN[name]
     assert BROKEN.keys() == holds.CHECKS.keys()
+    monkeypatch.setattr(holds, "town", lambda *size: bodies.town(*size or (2, 6)))
+    monkeypatch.setattr(holds, "terrain", lambda: bodies.terrain(6))
     monkeypatch.setattr(holds, study, broken(getattr(holds, study)))
     row = holds.check(name)
     assert 0 < row["wrong"] <= row["asked"]
