@@ -12,7 +12,8 @@ import validation.references.mitsuba.scene  # noqa: F401  # selects the variant
 from renderer.scene.camera import Camera, OrthographicCamera, PerspectiveCamera, PinholeCamera, ThinLensCamera
 from renderer.scene.cameras.thin_lens import lens_places
 
-Vector = NDArray[np.float64]
+Vectors = NDArray[np.float64]
+Rays = tuple[Vectors, Vectors]
 # The samples of a pixel that are compared where each starts at another point of a lens.
 _SAMPLES = 9
 
@@ -34,32 +35,36 @@ def largest_distance(camera: Camera, resolution: tuple[int, int]) -> float:
     width, height = resolution
     sensor = mi.load_dict(_sensor(camera, width, height))
     columns, rows = (np.unique(np.linspace(0, size - 1, 33).astype(int)) for size in resolution)
-    x, y = np.meshgrid(columns + 0.5, rows + 0.5)
-    worst = 0.0
+    x, y = (place.ravel() for place in np.meshgrid(columns + 0.5, rows + 0.5))
+    worst: list[float] = []
     for number in range(_SAMPLES if isinstance(camera, ThinLensCamera) else 1):
         u, v = lens_places(x, y, number)
         ours = camera._sample_rays(x, y, width, height, number, _SAMPLES)
-        for at in np.ndindex(x.shape):
-            # The x axis of Mitsuba's cameras points left.
-            lens = mi.Point2f(float(1.0 - u[at]), float(v[at]))
-            ray, _ = sensor.sample_ray(0.0, 0.5, mi.Point2f(float(x[at]) / width, float(y[at]) / height), lens)
-            theirs = np.array(ray.o, np.float64), np.array(ray.d, np.float64)
-            worst = max(worst, _distance((ours[0][at], ours[1][at]), theirs, camera, height))
-    return worst
+        # The x axis of Mitsuba's cameras points left.
+        film, lens = np.stack([x / width, y / height], axis=1), np.stack([1.0 - u, v], axis=1)
+        worst.append(_distance(ours, _rays(sensor, film, lens), camera, height))
+    return float(np.max(worst))
 
 
-def _distance(ours: tuple[Vector, Vector], theirs: tuple[Vector, Vector], camera: Camera, height: int) -> float:
-    """The larger distance in pixels of two rays where they cross the planes through the target and half-way to it."""
+def _rays(sensor: mi.Sensor, film: Vectors, lens: Vectors) -> Rays:
+    """Mitsuba's rays through places (n, 2) of film and lens."""
+    pairs = zip(film.tolist(), lens.tolist(), strict=True)
+    rays = [sensor.sample_ray(0.0, 0.5, mi.Point2f(place), mi.Point2f(start))[0] for place, start in pairs]
+    return np.array([ray.o for ray in rays], np.float64), np.array([ray.d for ray in rays], np.float64)
+
+
+def _distance(ours: Rays, theirs: Rays, camera: Camera, height: int) -> float:
+    """The largest distance in pixels of two rays where they cross the planes through the target and half-way to it."""
     target = float(np.linalg.norm(np.subtract(camera.target, camera.eye)))
     apart = ((_at(*ours, camera, away) - _at(*theirs, camera, away), away) for away in (target, 0.5 * target))
-    return max(float(np.linalg.norm(difference)) / _pixel(camera, height, away) for difference, away in apart)
+    return float(np.max([np.linalg.norm(off, axis=-1).max() / _pixel(camera, height, away) for off, away in apart]))
 
 
-def _at(o: Vector, d: Vector, camera: Camera, away: float) -> Vector:
-    """The point where a ray crosses the plane that faces the camera, so far away from it."""
+def _at(o: Vectors, d: Vectors, camera: Camera, away: float) -> Vectors:
+    """The points where rays cross the plane that faces the camera, so far away from it."""
     _, _, forward = camera.frame()
-    t = (away - float(np.dot(o - np.asarray(camera.eye), forward))) / float(np.dot(d, forward))
-    return o + t * d
+    t = (away - (o - np.asarray(camera.eye)) @ forward) / (d @ forward)
+    return np.asarray(o + t[:, None] * d)
 
 
 def _pixel(camera: Camera, height: int, away: float) -> float:
