@@ -255,8 +255,8 @@ sys.exit(code)
 @pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
 @pytest.mark.parametrize("threads", [1, 2])
 def test_control_c_stops_within_seconds_and_writes_nothing(tmp_path: Path, threads: int) -> None:
-    """Brute force over 81,000 faces at 1024 x 1024 would take minutes."""
-    scene, out = str(ROOT / "scenes" / "glass.toml"), str(tmp_path / "a.png")
+    """Brute force over 77,000 faces at 1024 x 1024 would take minutes."""
+    scene, out = str(ROOT / "scenes" / "mirrors.toml"), str(tmp_path / "a.png")
     # Compile here, so that the signal meets the tracing and not the compiler.
     render(load_scene(scene), resolution=(1, 1), accelerator="brute", threads=1)
     arguments = ["render", scene, "-o", out, "--accelerator", "brute", "--resolution", "1024x1024"]
@@ -300,7 +300,8 @@ def test_compile_fails_where_nothing_can_be_kept(tmp_path: Path) -> None:
     script = (
         "import sys, renderer.jit.cache as store, renderer.precompile as ahead\n"
         "store._folders = lambda sources: store.Folders(None, ())\n"
-        "ahead.PARTS['queries'] = [part for part in ahead.PARTS['queries'] if part.name == 'steps of a search']\n"
+        "from renderer.materials.dielectric import fresnel\n"
+        "ahead.PARTS['queries'] = [ahead.Part('light that glass reflects', lambda: fresnel(1.0, 1.0, 1.0, 1.5))]\n"
         "from renderer.cli.main import main; sys.exit(main(['compile', '--queries', '--quiet']))"
     )
     done = subprocess.run(
