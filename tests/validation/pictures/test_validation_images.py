@@ -22,8 +22,9 @@ from renderer.scene.light import DirectionalLight, PointLight
 from renderer.scene.scene import Floor, RenderSettings, Scene, SceneObject, load_scene
 from validation.gates import Gate
 from validation.job import Job
-from validation.pictures import ladder, monte_carlo, one_ray, plan
+from validation.pictures import ladder, monte_carlo, one_ray, plan, verdict
 from validation.pictures import section as images
+from validation.pictures.explain import pixels
 from validation.pictures.plan import WHITTED, PictureEffort, Reference, plan_pictures
 from validation.pictures.shifted_film import shifted
 from validation.references.mitsuba import path as mitsuba_path
@@ -173,6 +174,11 @@ DEFECTS = {
 def test_every_defect_turns_a_gate_red(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, defect: str) -> None:
     known = Reference("whitted", WHITTED, lambda _: None, lambda *_, **__: reference_balls())
     monkeypatch.setattr(plan, "REFERENCES", (known,))
+    # Reasons of single pixels are judged elsewhere.
+    monkeypatch.setattr(verdict, "_SAMPLE", 1)
+    monkeypatch.setattr(verdict, "_RULED", 1)
+    monkeypatch.setattr(pixels, "_AT_ONCE", 1)
+    monkeypatch.setattr(pixels, "SETTLED", 1)
     wrong, seen_by = DEFECTS[defect]
     monkeypatch.setattr(one_ray, "render", wrong)
     record, gates = check(tmp_path, balls())
