@@ -367,6 +367,8 @@ def test_hits_that_are_lost_are_broken_promises_and_no_exceptions(
         return replace(found, **{key: np.where(lost, none, values) for key, (values, none) in some.items()})
 
     monkeypatch.setattr(Queries, "closest_hit", losing)
+    monkeypatch.setattr(planes, "_SIDE", 40)
+    monkeypatch.setattr(planes, "_PIXELS", 16)
     assert broken(name)
 
 
