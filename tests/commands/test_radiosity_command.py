@@ -3,6 +3,7 @@
 import argparse
 import re
 import warnings
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -85,6 +86,12 @@ def test_every_option_is_here() -> None:
     assert {max(action.option_strings, key=len, default=action.dest) for action in actions} == set(OPTIONS)
 
 
+@cache
+def radiance(**options: Any) -> Any:
+    """Of the room of ``folder``, which is always the same."""
+    return render(lit_scene(load_scene("room.toml"), **options)).radiance
+
+
 @cases(
     ("words", "given"),
     [
@@ -99,11 +106,9 @@ def test_every_option_is_here() -> None:
 def test_a_picture_is_that_of_the_lit_scene(folder: Path, words: list[str], given: dict[str, Any]) -> None:
     usual = {"edge": 0.3, "rtol": 0.01}
     run("--edge", 0.3, "--rtol", 0.01, *words, "-o", "a.npy")
-    scene = load_scene("room.toml")
-    expected = render(lit_scene(scene, **{**usual, **given})).radiance
+    expected = radiance(**{**usual, **given})
     assert np.array_equal(np.load("a.npy"), expected)
-    same = np.array_equal(expected, render(lit_scene(scene, **usual)).radiance)
-    assert same == (given.keys() <= {"threads"})
+    assert np.array_equal(expected, radiance(**usual)) == (given.keys() <= {"threads"})
 
 
 def test_the_default_edge_is_a_share_of_the_scene(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -38,9 +38,9 @@ def test_at_the_feet_and_corners_of_a_house_the_sky_is_what_it_is_a_little_besid
     octree, around = Octree(vertices + place, faces), fibonacci_sphere(4000).directions
     points = np.array([[2, 3, 0], [6, 3, 0], [3, 2, 0], [3, 6, 0], [2, 2, 0], [6, 2, 0], [6, 6, 0], [2, 6, 0]], float)
     normals = np.array([[-1, 0, 1], [1, 0, 1], [0, -1, 1], [0, 1, 1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]])
+    beside = occlusion(octree, points + 1e-6 * normals + place, normals, around, packed=True)
     for kw in ({}, {"leaving": octree.closest_point(points + place).face}):
         hidden = occlusion(octree, points + place, normals, around, packed=True, **kw)
-        beside = occlusion(octree, points + 1e-6 * normals + place, normals, around, packed=True)
         np.testing.assert_array_equal(hidden, beside)
     up = sky_view_factor(octree, points + place, definition="geometric", patches=4000)
     np.testing.assert_allclose(up, [0.5] * 4 + [0.75] * 4, atol=0.01)

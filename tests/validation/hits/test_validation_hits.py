@@ -19,7 +19,9 @@ from renderer.trace.layout import BLOCK_FACES
 from validation.gates import Gate
 from validation.hits import check as check_hits
 from validation.hits import leaks as hit_leaks
+from validation.hits import mirrors, scenes, starts, walks
 from validation.hits import section as hits
+from validation.hits.bodies import Body
 from validation.hits.rays import float32_exact
 from validation.job import Job
 from validation.references.table import REFERENCES, HitReference
@@ -204,6 +206,11 @@ def test_steps_count_the_suites_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hits, "QUICK", EFFORT)
     for module in (hits, hit_leaks):
         monkeypatch.setattr(module, "leak_meshes", lambda: {"icosphere": icosphere(2)})
+    for module in (starts, walks):
+        monkeypatch.setattr(module, "bodies", lambda: iter([Body("ball", ball(), True)]))
+    monkeypatch.setattr(mirrors, "BOUNCES", 2)
+    monkeypatch.setattr(scenes, "QUICK", hits.HitEffort(rays=30, exact=6, leaks=0))
+    monkeypatch.setattr(scenes, "_PARTS_QUICK", (1, 4))
     seen: list[str] = []
     asked = dataclasses.replace(job(), step=seen.append)
     record, _ = hits.run(asked)
