@@ -159,11 +159,22 @@ def write_meshes(folder: Path) -> None:
     Pillow.fromarray(spots).save(folder / "spots.png")
 
 
+# The text of each table that was written: most are written several times.
+_TEXTS: dict[str, str] = {}
+
+
 def scene_of(folder: Path, table: Table) -> Scene:
     """The scene of a file that holds the table, beside its meshes."""
-    path = folder / "scene.toml"
-    path.write_text(tomlkit.dumps(table))
-    return load_scene(path)
+    return load_scene(written(folder, table))
+
+
+def written(folder: Path, table: Table) -> Path:
+    """A file that holds the table."""
+    path, told = folder / "scene.toml", repr(table)
+    if told not in _TEXTS:
+        _TEXTS[told] = tomlkit.dumps(table)
+    path.write_text(_TEXTS[told])
+    return path
 
 
 def _variations(table: Table) -> Iterator[Variation]:
