@@ -181,10 +181,11 @@ def test_a_background_takes_the_place_of_the_files_sky(folder: Path, under_sky: 
     assert same(way(case))
 
 
-@cases("way", [*WAYS, *WRITTEN])
 @cases("other", [v for v in VARIATIONS if v.keys[0] == "render"])
-def test_the_files_settings_hold(folder: Path, other: Variation, way: Any) -> None:
-    assert same(way(of_file(folder, other)))
+def test_the_files_settings_hold(folder: Path, other: Variation) -> None:
+    case = of_file(folder, other)
+    for way in (*WAYS, *WRITTEN):
+        assert same(way(case)), way
 
 
 @cases("other", [v for v in VARIATIONS if v.keys[0] not in ("render", "camera")])
