@@ -18,18 +18,15 @@ HITS = tradeoff_hits.HitTimingEffort(level=3, rays=2000, judged=400, leaks=5000,
 PICTURES = tradeoff_pictures.PictureTimingEffort(size=32, theirs=(1, 16), truth=36, runs=1)
 
 
-@pytest.fixture(scope="module")
-def record() -> dict[str, Any]:
-    """The section's two records of error against run time, as JSON gives them back."""
+def stored(*found: Any) -> Any:
+    """Records as JSON gives them back."""
+    return json.loads(json.dumps(found, allow_nan=False))
+
+
+def test_each_contender_errs_as_its_numbers_are_stored() -> None:
     costs: dict[str, float] = {}
-    scene = load_scene(SCENES / "mirrors.toml")
-    found: dict[str, Any] = {"tradeoff_hits": tradeoff_hits.run(HITS, costs)}
-    found["tradeoff_pictures"], found["split"] = tradeoff_pictures.run(scene, "mirrors", PICTURES, costs)
-    return dict(json.loads(json.dumps(found | {"costs": costs}, allow_nan=False)))
-
-
-def test_each_contender_errs_as_its_numbers_are_stored(record: dict[str, Any]) -> None:
-    points = {p["name"]: p for p in record["tradeoff_hits"]["points"]}
+    record, _ = stored(tradeoff_hits.run(HITS, costs), costs)
+    points = {p["name"]: p for p in record["points"]}
     # Float64 rounds t by 2^-53 and enlarges it by 1 / cos; float32 rounds the vertices or t itself by 2^-24.
     assert points["ours"]["errors"]["max"] < 1e-13
     for name in ("ours_float32", "embree_default", "embree_robust", "igl", "mitsuba"):
@@ -79,8 +76,11 @@ def test_a_film_refuses_what_it_cannot_judge(name: str, why: str) -> None:
         Film(scene, 8)
 
 
-def test_sampling_and_truncation_fall_and_arithmetic_is_small(record: dict[str, Any]) -> None:
-    curves = {(c["who"], c["knob"]): c for c in record["tradeoff_pictures"]["curves"]}
+def test_sampling_and_truncation_fall_and_arithmetic_is_small() -> None:
+    costs: dict[str, float] = {}
+    scene = load_scene(SCENES / "mirrors.toml")
+    (record, split), _ = stored(tradeoff_pictures.run(scene, "mirrors", PICTURES, costs), costs)
+    curves = {(c["who"], c["knob"]): c for c in record["curves"]}
     for who in ("ours", "Mitsuba"):
         errors = [p["rmse"] for p in curves[who, "samples"]["points"]]
         # Random samples give -1/2; 256 pixels scatter about it, and what does not converge has 0.
@@ -89,7 +89,7 @@ def test_sampling_and_truncation_fall_and_arithmetic_is_small(record: dict[str, 
         assert depths[0] > 10 * depths[-2]
     weights = [p["rmse"] for p in curves["ours", "min_weight"]["points"]]
     assert weights == sorted(weights) and weights[-1] > 0.0
-    parts = {p["name"]: p for p in record["split"]["parts"]}
+    parts = {p["name"]: p for p in split["parts"]}
     assert min(parts["sampling"]["rmse"], parts["truncation"]["rmse"]) > parts["arithmetic"]["rmse"] > 0.0
     # Radiance of about 1 in float32, after some hundred roundings of 6e-8.
     assert parts["arithmetic"]["rmse"] < 1e-5
