@@ -165,8 +165,8 @@ class Hits(Attributes):
         """
         hit = self.hit
         if hit.all():
-            flat = (values.reshape(-1) for values in (self.face, self.u, self.v))
-            return points_on(self._mesh, *flat).reshape(*hit.shape, 3)
+            face, u, v = self.face.reshape(-1), self.u.reshape(-1), self.v.reshape(-1)
+            return points_on(self._mesh, face, u, v).reshape(*hit.shape, 3)
         points = np.full((*hit.shape, 3), np.nan)
         points[hit] = points_on(self._mesh, self.face[hit], self.u[hit], self.v[hit])
         return points
