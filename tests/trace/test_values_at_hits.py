@@ -92,3 +92,14 @@ def test_some_hits_are_those_of_their_rays():
         np.testing.assert_array_equal(getattr(some, name), getattr(again, name))
     np.testing.assert_array_equal(octree.any_hit(some.points, [0, 0, 1], leaving=some),
                                   octree.any_hit(again.points, [0, 0, 1], leaving=again))  # fmt: skip
+
+
+@pytest.mark.parametrize("level", [2, 7])
+def test_places_of_many_hits_have_the_bits_of_those_of_some(level: int) -> None:
+    """Fewer faces than hits and more; all rays hit, and some."""
+    octree, rng = Octree(icosphere(level)), np.random.default_rng(1)
+    for reach in (0.5, 2.0):
+        hits = octree.closest_hit(rng.uniform(-reach, reach, (40_000, 3)), rng.normal(size=(40_000, 3)))
+        some = [hits[first : first + 999] for first in range(0, 40_000, 999)]
+        assert hits.points.tobytes() == b"".join(part.points.tobytes() for part in some)
+        assert hits.normals.tobytes() == b"".join(part.normals.tobytes() for part in some)
