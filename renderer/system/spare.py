@@ -42,10 +42,18 @@ def _unused(size: int) -> NDArray[np.uint8]:
             held = [_blocks.popleft()]
         except IndexError:  # other threads have the rest
             break
-        if getrefcount(held[0]) == _UNUSED and _LEAST_SHARE * held[0].nbytes <= size <= held[0].nbytes:
-            return held[0]
+        if getrefcount(held[0]) == _UNUSED:
+            if not _is_as_made(held[0]):
+                continue
+            if _LEAST_SHARE * held[0].nbytes <= size <= held[0].nbytes:
+                return held[0]
         _blocks.append(held[0])
     return np.empty(size, np.uint8)
+
+
+def _is_as_made(block: NDArray[np.uint8]) -> bool:
+    """Whether nobody has changed a block, which is the ``base`` of arrays in it."""
+    return block.flags.writeable and block.ndim == 1 and block.dtype == np.uint8
 
 
 def _forget_oldest() -> None:

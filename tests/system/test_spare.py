@@ -50,6 +50,26 @@ def test_what_somebody_holds_is_left_alone(hold):
     assert first in map(address, others)
 
 
+def frozen(block):
+    block.flags.writeable = False
+
+
+def folded(block):
+    block.shape = (2, -1)
+
+
+def renamed(block):
+    block.dtype = np.float64
+
+
+@cases("change", [frozen, folded, renamed])
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_memory_that_somebody_changed_is_not_used_again(change):
+    change(recycled(LARGE).base)
+    array = recycled(LARGE - 1)
+    assert array.flags.writeable and array.shape == (LARGE - 1,)
+
+
 def test_an_array_holds_no_more_than_twice_its_memory():
     recycled(LARGE)
     assert recycled(LARGE // 2 + 1).base.nbytes == 8 * LARGE
