@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from renderer.mesh.mesh import Mesh
 from renderer.results.attributes import Attributes
-from renderer.results.hits import points_on
+from renderer.results.hits import points_on, where_found
 
 
 @dataclass(eq=False, slots=True)
@@ -65,6 +65,4 @@ class ClosestPoints(Attributes):
         array([[0.5 , 0.25, 1.  ],
                [ nan,  nan,  nan]])
         """
-        points, found = np.full((*self.face.shape, 3), np.nan), self.found
-        points[found] = points_on(self._mesh, self.face[found], self.u[found], self.v[found])
-        return points
+        return where_found(self.found, points_on, self._mesh, self.face, self.u, self.v)

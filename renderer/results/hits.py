@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -163,13 +164,7 @@ class Hits(Attributes):
         array([[0.5 , 0.25, 1.  ],
                [ nan,  nan,  nan]])
         """
-        hit = self.hit
-        if hit.all():
-            face, u, v = self.face.reshape(-1), self.u.reshape(-1), self.v.reshape(-1)
-            return points_on(self._mesh, face, u, v).reshape(*hit.shape, 3)
-        points = np.full((*hit.shape, 3), np.nan)
-        points[hit] = points_on(self._mesh, self.face[hit], self.u[hit], self.v[hit])
-        return points
+        return where_found(self.hit, points_on, self._mesh, self.face, self.u, self.v)
 
     @property
     def normals(self) -> NDArray[np.float64]:
@@ -183,12 +178,7 @@ class Hits(Attributes):
         array([[ 0.,  0.,  1.],
                [nan, nan, nan]])
         """
-        hit = self.hit
-        if hit.all():
-            return _normals(self._mesh, self.face.reshape(-1)).reshape(*hit.shape, 3)
-        normals = np.full((*hit.shape, 3), np.nan)
-        normals[hit] = _normals(self._mesh, self.face[hit])
-        return normals
+        return where_found(self.hit, _normals, self._mesh, self.face)
 
 
 @dataclass(eq=False, slots=True)
@@ -287,15 +277,33 @@ class AllHits(Attributes):
         return _normals(self._mesh, self.face)
 
 
+def where_found(
+    found: NDArray[np.bool_], rows_of: Callable[..., NDArray[np.float64]], mesh: Mesh, *places: NDArray[Any]
+) -> NDArray[np.float64]:
+    """The rows (..., 3) that ``rows_of(mesh, *places)`` makes of what was found; nan elsewhere."""
+    if found.all():
+        return rows_of(mesh, *(place.reshape(-1) for place in places)).reshape(*found.shape, 3)
+    values = np.full((*found.shape, 3), np.nan)
+    values[found] = rows_of(mesh, *(place[found] for place in places))
+    return values
+
+
 def points_on(
     mesh: Mesh, face: NDArray[np.int64], u: NDArray[np.float64], v: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """The points (k, 3) of faces at barycentrics u and v."""
-    points = np.empty((len(face), 3))
-    for begin in range(0, len(face), _ROWS):
-        rows = slice(begin, begin + _ROWS)
-        points[rows] = _some_points(mesh, face[rows], u[rows], v[rows])
-    return points
+    return _some_at_once(_some_points, mesh, face, u, v)
+
+
+def _some_at_once(
+    rows_of: Callable[..., NDArray[np.float64]], mesh: Mesh, *places: NDArray[Any]
+) -> NDArray[np.float64]:
+    """``rows_of(mesh, *places)``, _ROWS at a time."""
+    values = np.empty((len(places[0]), 3))
+    for begin in range(0, len(values), _ROWS):
+        some = slice(begin, begin + _ROWS)
+        values[some] = rows_of(mesh, *(place[some] for place in places))
+    return values
 
 
 def _some_points(
@@ -316,8 +324,8 @@ def _normals(mesh: Mesh, face: NDArray[np.int64]) -> NDArray[np.float64]:
     # Each face once, where that is less.
     if len(face) > len(mesh.faces):
         return mesh.face_normals().take(face, axis=0)
-    normals = np.empty((len(face), 3))
-    for begin in range(0, len(face), _ROWS):
-        rows = slice(begin, begin + _ROWS)
-        normals[rows] = face_normals(mesh.vertices[mesh.faces[face[rows]]])
-    return normals
+    return _some_at_once(_some_normals, mesh, face)
+
+
+def _some_normals(mesh: Mesh, face: NDArray[np.int64]) -> NDArray[np.float64]:
+    return face_normals(mesh.vertices[mesh.faces[face]])

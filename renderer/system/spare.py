@@ -4,6 +4,7 @@ Each array has a block of its own, so that who keeps one of an answer's arrays k
 """
 
 from collections import deque
+from contextlib import suppress
 from sys import getrefcount
 from typing import Any
 
@@ -37,17 +38,15 @@ def recycled(count: int, dtype: Any = np.float64) -> NDArray[Any]:
 
 def _unused(size: int) -> NDArray[np.uint8]:
     """A block of ``size`` bytes or some more, which is in ``_blocks`` no longer."""
-    for _ in range(len(_blocks)):
-        try:
+    with suppress(IndexError):  # other threads may have taken the rest
+        for _ in range(len(_blocks)):
             held = [_blocks.popleft()]
-        except IndexError:  # other threads have the rest
-            break
-        if getrefcount(held[0]) == _UNUSED:
-            if not _is_as_made(held[0]):
-                continue
-            if _LEAST_SHARE * held[0].nbytes <= size <= held[0].nbytes:
-                return held[0]
-        _blocks.append(held[0])
+            if getrefcount(held[0]) == _UNUSED:
+                if not _is_as_made(held[0]):
+                    continue
+                if _LEAST_SHARE * held[0].nbytes <= size <= held[0].nbytes:
+                    return held[0]
+            _blocks.append(held[0])
     return np.empty(size, np.uint8)
 
 
@@ -57,13 +56,7 @@ def _is_as_made(block: NDArray[np.uint8]) -> bool:
 
 
 def _forget_oldest() -> None:
-    blocks = list(_blocks)
-    excess = sum(block.nbytes for block in blocks) - MOST
-    for block in blocks:
-        if excess <= 0:
-            break
-        excess -= block.nbytes
-        try:
-            _blocks.popleft()
-        except IndexError:
-            break
+    excess = sum(block.nbytes for block in list(_blocks)) - MOST
+    with suppress(IndexError):
+        while excess > 0:
+            excess -= _blocks.popleft().nbytes

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple, TypeGuard, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +29,8 @@ _MOST = float(np.finfo(np.float64).max)
 
 def _vectors(argument: str, values: ArrayLike) -> NDArray[Any]:
     """The values as an array (..., 3)."""
-    if _is_plain(values):
-        return values
+    if are_plain(values, values, 0.0, math.inf):
+        return cast(Floats, values)
     array = real_argument(argument, values)
     expect(array.ndim >= 1 and array.shape[-1] == 3, argument, "shape (..., 3)", f"shape {array.shape}")
     return array
@@ -188,13 +188,6 @@ def are_plain(origins: Any, directions: Any, t_min: Any, t_max: Any) -> bool:
     if not (shape == directions.shape and t_min == 0.0 and t_max == math.inf):
         return False
     return origins.flags.carray and directions.flags.carray
-
-
-def _is_plain(values: ArrayLike) -> TypeGuard[NDArray[np.float64]]:
-    """Whether it is an (n, 3) array of float64 that kernels take as it is."""
-    if not (type(values) is np.ndarray and values.dtype is _FLOAT64 and values.ndim == 2):
-        return False
-    return values.shape[1] == 3 and values.flags.carray
 
 
 def check_faces(argument: str, faces: ArrayLike, shape: tuple[int, ...], most: int) -> NDArray[np.int64]:
