@@ -315,6 +315,19 @@ def load4(typingctx, array, index):
 
 
 @intrinsic
+def equal4(typingctx, array, index, value):
+    """The bits of those of four int32 from ``index`` on that equal an int64."""
+
+    def codegen(context, builder, sig, args):
+        word = ir.VectorType(ir.IntType(32), 4)
+        four = _load(builder, _pointer(context, builder, sig.args[0], args[0], args[1], word), sig.args[0])
+        same = builder.icmp_signed("==", four, _spread_word(builder, builder.trunc(args[2], word.element), 4))
+        return builder.zext(builder.bitcast(same, ir.IntType(4)), ir.IntType(64))
+
+    return types.int64(array, types.intp, types.int64), codegen
+
+
+@intrinsic
 def gather8(typingctx, base, rows, step, column):
     """Eight float64, ``base[row * step + column]`` for the eight row numbers at ``rows``."""
 
@@ -606,11 +619,11 @@ def _links(context: Any, builder: Any, pointer_type: Any, links: Any, index: Any
     return _load(builder, at, pointer_type)
 
 
-def _spread_word(builder: Any, value: Any) -> Any:
-    """An int32 in all of eight lanes."""
-    word = ir.VectorType(value.type, 8)
+def _spread_word(builder: Any, value: Any, lanes: int = 8) -> Any:
+    """An int32 in all lanes."""
+    word = ir.VectorType(value.type, lanes)
     one = builder.insert_element(ir.Constant(word, ir.Undefined), value, value.type(0))
-    return builder.shuffle_vector(one, one, ir.Constant(word, [0] * 8))
+    return builder.shuffle_vector(one, one, ir.Constant(ir.VectorType(ir.IntType(32), lanes), [0] * lanes))
 
 
 @intrinsic

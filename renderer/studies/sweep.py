@@ -1,8 +1,8 @@
 """Rays from many points in many directions, traced tile by tile without writing them all down.
 
-A tile is up to TILE points that lie together. The rays of a tile in one direction are traced together, as a packet of
-parallel rays; then those in the next direction. Directions below a point's horizon need no ray. Each point sums its
-directions in their order, and no ray depends on another, so the bits of its result do not depend on its tile.
+A tile is up to TILE points that lie together. The rays of a tile in one direction are traced together, then
+those in the next direction. Directions below a point's horizon need no ray. Each point sums its directions in their
+order, and no ray depends on another, so the bits of its result do not depend on its tile.
 """
 
 from typing import Any, NamedTuple
@@ -50,9 +50,9 @@ from renderer.trace.trees import tree_pointers
 
 TILE = 256
 # A tile ends where the curve leaves the largest cell, but not before so many points: else its parts may be far apart,
-# and the beam around them wide. With 256 points whatever the cells, beams list three times as many leaves.
+# and their rays enter three times as many leaves together.
 _LEAST_TILE = 32
-# From so many points on, their rays in one direction are traced with a beam around all of them.
+# From so many points on, their rays in one direction are traced together.
 _TOGETHER = 16
 # So often may that be given up in a tile before it is no longer tried.
 _TRIES = 4
@@ -69,11 +69,10 @@ SUM, WHOLE, _START, _FAN = 18 * TILE, 19 * TILE, 20 * TILE, (20 + ROW) * TILE
 # The room for all tables: what sixteen faces a point take; and for a table of none.
 _FANS, _LEAST_FAN = 256 * TILE, FAN_HEAD
 _POINT_DOUBLES = _FAN + _FANS
-# Its row; the leaf that hid its last direction, or 0; whether it is a corner of the mesh; where
-# its table begins, -1 for none; and once for the tile, how often tracing its rays together may still be tried, and
-# where the next table begins.
-_ROW, _HIDER, _CORNER, _TABLE = 0, TILE, 2 * TILE, 3 * TILE
-_LEFT, _TABLES, _POINT_INTEGERS = 4 * TILE, 4 * TILE + 1, 4 * TILE + 8
+# Its row; whether it is a corner of the mesh; where its table begins, -1 for none; and once for the tile, how often
+# tracing its rays together may still be tried, and where the next table begins.
+_ROW, _CORNER, _TABLE = 0, TILE, 2 * TILE
+_LEFT, _TABLES, _POINT_INTEGERS = 3 * TILE, 3 * TILE + 1, 3 * TILE + 8
 
 
 class Places(NamedTuple):
@@ -199,7 +198,6 @@ def begin_tile(tree, places, rows, begin, count, scratch):
         row = rows[begin + i]
         face, o, start = load(leaving, row), row3(points, row), offset(scratch.points, _START + ROW * i)
         store(scratch.numbers, _ROW + i, row)
-        store(scratch.numbers, _HIDER + i, 0)
         put3(scratch.points, _ABOVE + 3 * i, o)
         put_no_start(start)
         if len(places.normals) > 0:
@@ -322,8 +320,6 @@ def _aim(places, sky, scratch, k, count, listed, rays):
         if seen:
             put3(scratch.directions, 3 * rays, d)
             store(scratch.limits, rays, limit)
-            if rays < TILE:
-                store(scratch.parallel.hiders, rays, load(scratch.numbers, _HIDER + i))
         store(scratch.values, listed, value)
         store(scratch.listed, listed, (k * TILE + i) * 2 + np.int64(seen))
         listed += 1
@@ -339,8 +335,6 @@ def _take_down(answers, scratch, listed):
         code, hides = load(scratch.listed, entry), True
         if code & 1 != 0:
             hides = load(scratch.found.hit, ray)
-            if ray < TILE:
-                store(scratch.numbers, _HIDER + (code >> 1) % TILE, load(scratch.parallel.hiders, ray))
             ray += 1
         k, i = (code >> 1) // TILE, (code >> 1) % TILE
         if hides == answers.hidden:

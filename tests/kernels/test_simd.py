@@ -9,6 +9,7 @@ from renderer.numerics.simd import (
     bits_float,
     broadcast_like,
     double_of,
+    equal4,
     fabs,
     float32_pointer,
     float64_pointer,
@@ -129,6 +130,17 @@ def test_bits():
     for k in range(63):
         assert bit_operations(1 << k)[1] == k
         assert bit_operations((1 << k) | (1 << 62))[1] == k
+
+
+@njit
+def equal_words(words, index, value):
+    return equal4(pointer(words), index, value)
+
+
+def test_words_that_are_equal():
+    words = np.array([7, -1, 3, 3, -1, 3], np.int32)
+    for value, bits in ((3, 0b0110), (-1, 0b1001), (7, 0)):
+        assert equal_words(words, 1, value) == bits
 
 
 @njit

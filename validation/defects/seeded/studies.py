@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from validation.defects.changes import Change, Rule, Wrapped, after
-from validation.defects.edits import argument, call, choice, compare, value
+from validation.defects.edits import argument, call, choice, compare, operand, value
 from validation.defects.seeded.defect import Defect
 
 
@@ -44,8 +44,7 @@ _CHANGES: dict[str, Change] = {
     "bits stand the other way round in their bytes": after("share.evaluate_bits", _mirrored_bytes),
     "rays of studies leave a face on its other side": Rule("side-of-study-ray", compare("<")),
     "the whole is without what the horizon hides": Rule("cosine-weight", call("abs", "max(_0, 0.0)")),
-    "a list of leaves lacks its last one": Rule("end-of-leaf-list", argument(1, "_ - 1 if _ % 8 > 1 else _")),
-    "the leaf that hid a ray hides the next one unasked": Rule("hider-is-tested", value("True")),
+    "boxes seen along parallel rays have no depth": Rule("projected-box", operand("+", 1, None)),
     "a screen takes its share twice": Rule("share-of-pane", value("_ * _")),
     "patches weigh the same at all heights": Rule("cosine-of-patches", value("False")),
     "distances in units of the directions": Wrapped("share.limits_of", _limits_in_directions),
