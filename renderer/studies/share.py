@@ -277,7 +277,7 @@ def _run_in_order(request: StudyRequest, mesh: Mesh, look: Look, most: int) -> N
             block = points[first : first + _BLOCK]
             order, steps = order_along_curve(block)
             order = first + order
-            # With few points the shared beam of a tile costs more than it saves: up to 58 % at a point for 30 faces.
+            # With few points the shared walk of a tile costs more than it saves.
             steps = steps if are_dense(block, mesh) else steps[:0]
 
             def look_at(begin: int, end: int, way: tuple[Integers, Integers] = (order, steps)) -> Iterator[None]:
