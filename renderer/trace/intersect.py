@@ -58,6 +58,9 @@ SLANT = 2.0**-16
 # The error of an uncertain numerator, as a share of A D Z: its own 11 u, and the determinant's share of 2^-27. What
 # resolves it moves t by no more, because the ray meets the plane itself within the face's box.
 ERROR = 2.0**-48
+# The same where the determinant is uncertain, as a share of D cubed: such a face is hit where the ray comes within
+# ``resolve.ROUNDING`` of it, 2^-46 L, times its normal, which is at most 3 D^2.
+BESIDE = 2.0**-44
 # The error of an edge function as a share of A D, of ``unsure_sides``: 10 u and room.
 SIDE_ERROR = 2.0**-49
 # The slack of a ray that starts exactly at its origin, a corner of the mesh.
@@ -459,7 +462,9 @@ def meet_planes(tree, base, edges, seen, ray, t_min, t_max):
             uncertain = determinant_uncertain | near | _may_be_on_edge(edges)
             # Whether the numerator, with its error, may make a t from t_min to t_max. A t that rounding made negative
             # may be 0. ERROR has the determinant's error too, because the numerator is t times the determinant.
-            base_t, error = fabs(denominator), product * sizes.along * splat4(ERROR)
+            base_t, size = fabs(denominator), sizes.across + sizes.along
+            error = product * sizes.along * splat4(ERROR)
+            error = maximum(error, select(determinant_uncertain, size * size * size * splat4(BESIDE), splat4(0.0)))
             within = (height + error >= splat4(t_min) * base_t) & (height - error <= splat4(t_max) * base_t)
             ahead, extended = (t >= zero) | (height <= error), _is_extended(edges, sizes)
             due = uncertain & ahead & within & extended

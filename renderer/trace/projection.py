@@ -37,12 +37,14 @@ from renderer.trace.intersect import load_corners
 # Let n be 2^-24, the error of a float32 operation. A box's planes err by n once they count from the centre. Middles,
 # halves, shears, products and sums follow: 13 n of all coordinates at most, and 2 n more where rays are compared.
 _BOX_ERROR = np.float32(2.0**-20)
-# A ray's coordinates are computed in float64 and rounded once. The middle and the half of a range err by n each, and so
-# does what is compared.
+# A ray's x, y, h and place along are computed in float64 from u, v and w, which are at most twice as large, and rounded
+# once. The middle and the half of a range err by n each, and so does what is compared.
 _RAY_ERROR = np.float32(2.0**-21)
-# The errors of the edge functions of ``intersect``, 9 * 2^-53 A D, and of those here. With every coordinate at most
-# s = G + Z + R, see ``see_faces``, A is at most 6 s and D at most 9 s: 2^-44 s^2, and room.
+# The errors of the edge functions of ``intersect``, 9 * 2^-53 A D, and of those here. No coordinate of rays and faces
+# exceeds the ``size`` of ``see_faces``, so A is at most 6 sizes and D at most 9: 2^-44 of its square, and room.
 _EDGE_ERROR = 2.0**-42
+# A face is hit from behind its plane where ``intersect.BESIDE`` allows it, by 2^-44 D^3.
+_BESIDE = 2.0**-34
 # Slack is rounded to float32.
 _MORE = np.float32(2.0 + 2.0**-8)
 _TINY = np.float32(2.0**-126)
@@ -215,7 +217,8 @@ def see_faces(tree, base, shear, projection, reach, error):
     c0, c1, c2 = x2 * y1 - y2 * x1, x0 * y2 - y0 * x2, x1 * y0 - y1 * x0
     determinant = c0 + c1 + c2
     sign = select(determinant < splat4(0.0), splat4(-p.sign), splat4(p.sign))
-    behind = limit * (along + reach) * 4.0 + fabs(determinant) * error
+    # Three edge functions times z, the determinant times what is wrong along the ray, and room.
+    behind = limit * (along + reach) * 4.0 + fabs(determinant) * error + size * size * size * _BESIDE
     return Faces(
         y2 - y1, y0 - y2, y1 - y0, x1 - x2, x2 - x0, x0 - x1, c0, c1, c2, limit,
         z0 * sign, z1 * sign, z2 * sign, fabs(determinant), behind,

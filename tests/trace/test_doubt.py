@@ -26,6 +26,21 @@ def test_a_ray_in_the_plane_of_a_face_does_not_hit_it_where_it_passes_beside():
     assert not only(face, origin, [0.38633234322957544, 0.14654329636785646, 0.48523761039149166]).hit[0]
 
 
+def test_whether_a_ray_hits_a_thin_face_just_behind_it_depends_on_no_other_face():
+    """It comes within rounding of the face, which counts, but only searches that another face made careful found it."""
+    own = [["0x1.8p+1", "0x1p+0", "-0x1.8p+1"],
+           ["-0x1.312c8f3895947p+10", "-0x1.316c8f3895947p+9", "-0x1.8p+1"],
+           ["-0x1.312c8f39605a5p+10", "-0x1.316c8f339444dp+9", "-0x1.7fffff8ce8231p+1"]]  # fmt: skip
+    far = ["0x1.306c8f3895947p+9", "0x1.31ec8f3895947p+9", "-0x1.ca62d6d4e05eap+10"]
+    line = [["-0x1.8p+1", "0x0p+0", "0x1p+0"], far, far]
+    origin = ["-0x1.5357b1c79031bp+9", "-0x1.53d7b1c3c2a8cp+8", "-0x1.7fffffda436fap+1"]
+    vertices = np.array([[float.fromhex(x) for x in row] for row in own + line])
+    ray = [[float.fromhex(x) for x in origin]], [[1.0, 1.0, -3.0]]
+    for faces in ([[0, 1, 2]], [[0, 1, 2], [3, 4, 5]]):
+        for mesh in (Octree(vertices, faces), BruteForce(vertices, faces)):
+            assert mesh.any_hit(*ray)[0] and mesh.closest_hit(*ray).t[0] == 0.0 and mesh.count_hits(*ray)[0] == 1
+
+
 def test_t_of_a_thin_face_met_at_a_small_angle_is_right():
     """t = 30.056 was reported."""
     face = [
