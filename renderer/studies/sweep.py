@@ -1,8 +1,8 @@
 """Rays from many points in many directions, traced tile by tile without writing them all down.
 
-A tile is up to TILE points that lie together. The rays of a tile in one direction are traced together, then
-those in the next direction. Directions below a point's horizon need no ray. Each point sums its directions in their
-order, and no ray depends on another, so the bits of its result do not depend on its tile.
+A tile is up to TILE points that lie together. The rays of a tile in one direction are traced together, then those
+in the next direction. Directions below a point's horizon need no ray. Each point sums its directions in their order,
+and no ray depends on another, so the bits of its result do not depend on its tile.
 """
 
 from typing import Any, NamedTuple

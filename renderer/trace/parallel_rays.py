@@ -25,7 +25,6 @@ from renderer.numerics.simd import (
     narrow,
     offset,
     pointer,
-    prefetch,
     reduce_max,
     reduce_min,
     set_first,
@@ -34,7 +33,7 @@ from renderer.numerics.simd import (
 )
 from renderer.trace.best import NO_FACE, no_hit
 from renderer.trace.intersect import Shear, make_shear
-from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CACHE_LINE, CHILDREN, NODE_WORDS, cache_aligned
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS, cache_aligned
 from renderer.trace.leaf import nearest_in_blocks
 from renderer.trace.projection import (
     EXTENT_WORDS,
@@ -57,15 +56,15 @@ from renderer.trace.single import search_carefully
 from renderer.trace.starts.record import EDGE
 from renderer.trace.starts.record import FACE as START_FACE
 from renderer.trace.starts.record import SLACK as START_SLACK
+from renderer.trace.stream import prefetch_node
 from renderer.trace.walk import blocks_of, stack_size
 
 # The walk gives up after it entered so many nodes for each ray: in a city and on a terrain with a point for each face
 # it enters 0.3 to 0.6.
 _MOST_NODES = 4
-_LINE = CACHE_LINE // 4
 # The rows of a group of eight rays, float32.
 _X, _Y, _H, _ALONG, _SLACK, _GROUP = 0, 8, 16, 24, 32, 40
-# Coordinates of rays that err by more could overflow.
+# Coordinates of rays that err by more could overflow; those that err by less are finite, and so is each middle.
 _TOO_FAR = np.float32(2.0**80)
 _NOWHERE = np.float32(np.inf)
 
@@ -265,8 +264,7 @@ def _visit_node(tree, rays, found, parallel, seen, node, top):
         if child >= 0:
             store(parallel.waiting, top, child)
             top += 1
-            for line in range(0, NODE_WORDS, _LINE):
-                prefetch(tree.nodes, child * NODE_WORDS + line)
+            prefetch_node(tree.nodes, child)
         else:
             some = _find_rays(parallel, seen, box_at(parallel.boxes, octant))
             if some != 0:

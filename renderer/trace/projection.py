@@ -45,7 +45,7 @@ _RAY_ERROR = np.float32(2.0**-21)
 _EDGE_ERROR = 2.0**-42
 # A face is hit from behind its plane where ``intersect.BESIDE`` allows it, by 2^-44 D^3.
 _BESIDE = 2.0**-34
-# Slack is rounded to float32.
+# A start that is off by its slack is off by twice as much in x, y or h; and slack is rounded to float32.
 _MORE = np.float32(2.0 + 2.0**-8)
 _TINY = np.float32(2.0**-126)
 

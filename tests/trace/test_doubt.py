@@ -5,6 +5,7 @@ import pytest
 from cases import cases
 
 from renderer import BruteForce, Octree
+from renderer.studies import occlusion
 from validation.oracle import exact
 from validation.stability.cases.edge_on import judged, ray_at, thin_face
 
@@ -39,6 +40,8 @@ def test_whether_a_ray_hits_a_thin_face_just_behind_it_depends_on_no_other_face(
     for faces in ([[0, 1, 2]], [[0, 1, 2], [3, 4, 5]]):
         for mesh in (Octree(vertices, faces), BruteForce(vertices, faces)):
             assert mesh.any_hit(*ray)[0] and mesh.closest_hit(*ray).t[0] == 0.0 and mesh.count_hits(*ray)[0] == 1
+            # So many points that their rays are traced together.
+            assert (occlusion(mesh, ray[0] * 20, None, ray[1], packed=True) == 0x80).all()
 
 
 def test_t_of_a_thin_face_met_at_a_small_angle_is_right():

@@ -32,11 +32,11 @@ RAYS = 800
 
 
 @kernel
-def _see(descriptor, rays, numbers, reach, room, entered, hit):
+def _see(descriptor, rays, numbers, reach, slack, room, entered, hit):
     """Which rays enter the octants of the root, and which may hit the faces of the first block."""
     tree, source = tree_pointers(descriptor), batch_pointers(rays, 1.0)
     shear = make_shear(ray_at(source, 0)[0])
-    projection, error = make_projection(source, 0, shear), error_of(np.float32(reach), np.float32(0.0))
+    projection, error = make_projection(source, 0, shear), error_of(np.float32(reach), np.float32(slack))
     at, boxes = pointer(room), offset(pointer(room), 24)
     put_boxes(boxes, see_boxes(projection, tree.nodes, 0, error))
     faces = see_faces(tree, 0, shear, projection, reach, widen(error))
@@ -50,13 +50,13 @@ def _see(descriptor, rays, numbers, reach, room, entered, hit):
             hit[first + k] = may_hit(faces, load(at, k), load(at, 8 + k), load(at, 16 + k))
 
 
-def seen(octree, origins, way):
-    """(n, 8) and (n, 4) bools: the boxes that rays enter, the faces that they may hit."""
+def seen(octree, origins, way, slack=0.0):
+    """(n, 8) and (n, 4) bools: the boxes that rays enter, the faces that they may hit, which start within ``slack``."""
     rays = RayBatch(origins, np.tile(way, (len(origins), 1)), np.zeros(1), np.full(1, np.inf))
     entered, hit = np.zeros((len(origins) // 8, 8), np.int64), np.zeros(len(origins), np.int64)
     room = np.empty(24 + EXTENT_WORDS, np.float32)
     reach = 4.0 * float(np.abs(origins - origins[0]).max())
-    _see(octree.tree.descriptor, rays, np.arange(len(origins)), reach, room, entered, hit)
+    _see(octree.tree.descriptor, rays, np.arange(len(origins)), reach, slack, room, entered, hit)
     bits = entered[:, None, :] >> np.arange(8)[None, :, None] & 1
     return bits.reshape(-1, 8).astype(bool), (hit[:, None] >> np.arange(4) & 1).astype(bool)
 
@@ -124,6 +124,22 @@ def test_rays_from_one_place_far_away_see_corners_within_rounding(way, place):
 
 @cases("way", WAYS)
 @cases("place", PLACES)
+def test_rays_that_are_off_by_their_slack_are_not_refused_what_they_meet_from_their_start(way, place):
+    octree, rng = scene_at(*place, 4)
+    boxes, faces = octree.tree.nodes[:CHILDREN].reshape(3, 2, 8).astype(float), octree.tree.faces[:4]
+    slack, back = 1e-3 * place[0], place[0] * np.array(way)
+    for octant in np.flatnonzero((boxes[:, 0] <= boxes[:, 1]).all(axis=0)):
+        corner = boxes[np.arange(3), rng.integers(0, 2, 3), octant]
+        origins = corner - back + slack * rng.choice([-1.0, 1.0], (8, 3))
+        assert seen(octree, origins, way, slack)[0][:, octant].all()
+    for k, corners in enumerate(octree.mesh.triangles[faces]):
+        for corner in corners:
+            origins = corner - back + slack * rng.choice([-1.0, 1.0], (8, 3))
+            assert seen(octree, origins, way, slack)[1][:, k].all()
+
+
+@cases("way", WAYS)
+@cases("place", PLACES)
 def test_a_ray_may_hit_the_faces_at_which_it_aims(way, place):
     octree, rng = scene_at(*place, 2)
     corners = octree.mesh.triangles[octree.tree.faces[:4]]
@@ -145,6 +161,13 @@ def test_a_ray_may_hit_the_faces_at_which_it_aims(way, place):
         inside = (np.abs(np.sign(edges).sum(axis=1)) == 3) & (height > 0.0)
         clear = (np.abs(edges) > 1e-3).all(axis=1) & (np.abs(height) > 1e-3 * place[0])
         np.testing.assert_array_equal(hit[clear, face], inside[clear])
+
+
+def test_a_thin_face_within_rounding_behind_a_ray_is_one_that_it_may_hit():
+    height = -3.0 - 2.0**-38
+    needle = [[-1024.0, -(2.0**-31), height], [1024.0, -(2.0**-31), height], [0.0, 2.0**-31, height]]
+    octree, origins, way = Octree(np.array(needle), [[0, 1, 2]]), np.tile([0.0, 0.0, -3.0], (8, 1)), (0.0, 0.0, 1.0)
+    assert octree.any_hit(origins, way).all() and seen(octree, origins, way)[1][:, 0].all()
 
 
 def pairs(face):
