@@ -28,6 +28,7 @@ from numba.core.serialize import dumps
 
 from renderer.jit.digest import PACKAGE, is_ours, source_digest
 from renderer.jit.levels import AHEAD_VARIABLE, LEVELS, lacking
+from renderer.jit.turns import turn
 from renderer.lazy import lazy
 from renderer.system.files import write_atomically
 
@@ -95,11 +96,29 @@ class KernelStore:
             payload = _read(path, key)
             if payload is not None:
                 with _tolerant(path):
-                    return CompileResult._rebuild(context, *payload)
+                    return self._rebuilt(signature, context, payload)
         return None
 
+    def _rebuilt(self, signature: Any, context: Any, payload: Any) -> CompileResult:
+        return CompileResult._rebuild(context, *payload)
+
+    @contextmanager
+    def turn(self, signature: Any, context: Any) -> Iterator[CompileResult | None]:
+        """A context in which no other process compiles the kernel for these types; yields the one that another process
+        has written meanwhile, or None.
+        """
+        if self._digest is None:
+            yield None
+            return
+        name = self._file(self._key(signature, context.codegen().magic_tuple()))
+        with turn(_folders(self._home).written, name) as waited:
+            yield self.load_overload(signature, context) if waited else None
+
     def save_overload(self, signature: Any, compiled: CompileResult) -> None:
-        """Write a kernel for later processes, and remove those compiled from other sources."""
+        """Nothing: ``keep`` was called before."""
+
+    def keep(self, signature: Any, compiled: CompileResult) -> None:
+        """Write a kernel for other processes, and remove those compiled from other sources."""
         folder = _folders(self._home).written
         if folder is None or self._digest is None or compiled.library.has_dynamic_globals:
             _Count.lost += 1

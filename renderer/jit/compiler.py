@@ -1,9 +1,9 @@
 """Compiles kernels by Numba at a third of its usual cost: only what Python calls is optimised and compiled.
 
 Numba takes each function, however small, through its whole pipeline: LLVM optimises and compiles it alone, then again
-in each of its callers, and a wrapper lets Python call it. Here a function called by kernels stays a *piece*: typed and
-lowered to LLVM code, but not optimised. A function called by Python is an *entry*: its piece and all pieces below it,
-linked into one module that LLVM optimises once.
+in each of its callers, and a wrapper lets Python call it. Here a function called by kernels stays a *piece*: typed,
+lowered to LLVM code and simplified, but not compiled. A function called by Python is an *entry*: its piece and all
+pieces below it, linked into one module that LLVM optimises once.
 
 This relies on Numba's internals. For untested versions of Numba, ``decorators`` calls ``probe``, and does without this
 module if that fails.
@@ -14,6 +14,7 @@ import pickle
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from functools import update_wrapper
+from importlib import import_module
 from typing import Any
 
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
@@ -22,7 +23,9 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, CompileResult, compile_result
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import LoweringPass, PassManager, register_pass
+from numba.core.datamodel.models import OpaqueModel
 from numba.core.environment import lookup_environment
+from numba.core.imputils import lower_constant
 from numba.core.registry import CPUDispatcher
 from numba.core.serialize import dumps
 from numba.core.typed_passes import (
@@ -33,7 +36,9 @@ from numba.core.typed_passes import (
     PreLowerStripPhis,
 )
 from numba.core.untyped_passes import FixupArgs, GenericRewrites, IRProcessing, ReconstructSSA, TranslateByteCode
+from numba.extending import register_model
 
+from renderer.jit.apart import ApartStore, Reference, write_symbol
 from renderer.jit.cache import KernelStore
 from renderer.jit.notice import compiling
 from renderer.lazy import lazy
@@ -59,7 +64,7 @@ OPTIONS = {
 
 
 class _PieceLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """A function's module as lowered, neither optimised nor compiled."""
+    """A function's module as lowered, simplified, but neither inlined nor compiled."""
 
     _merged: Any = None
 
@@ -67,6 +72,12 @@ class _PieceLibrary(JITCodeLibrary):  # type: ignore[misc]
         module.data_layout = self._codegen._data_layout
 
     def finalize(self) -> None:
+        # Each function alone first, as Numba does: what is inlined then is small. Worth 2 % of tracing.
+        module = self._final_module
+        for function in module.functions:
+            if not function.is_declaration:
+                passes, builder = self._codegen._function_pass_manager()
+                passes.run(function, builder)
         self._finalized = True
 
     def _get_module_for_linking(self) -> Any:
@@ -82,7 +93,12 @@ class _PieceLibrary(JITCodeLibrary):  # type: ignore[misc]
 
 
 class _EntryLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """A wrapper for Python and all pieces behind it, optimised together."""
+    """A wrapper for Python, or a function with a symbol, and all pieces behind it, optimised together.
+
+    references  the apart kernels that it calls
+    """
+
+    references: tuple[Reference, ...] = ()
 
     def _optimize_functions(self, module: Any) -> None:
         module.data_layout = self._codegen._data_layout
@@ -91,17 +107,13 @@ class _EntryLibrary(JITCodeLibrary):  # type: ignore[misc]
         self._codegen._check_llvm_bugs()
         module = self._final_module
         outer = [function.name for function in module.functions if not function.is_declaration]
-        _link_all(module, self._linking_libraries)
+        self.references = _link_all(module, self._linking_libraries)
         for function in module.functions:
             if not function.is_declaration and function.name not in outer:
                 # Private, so that it is dropped where it is inlined everywhere, and has no symbol. An internal function
                 # has one, by which another kernel's call of the same piece would find this function, whose arguments
                 # the optimiser may have changed.
                 function.linkage = "private"
-        # Each function alone first, as Numba does: what is inlined then is small. Worth 2 % of tracing.
-        for function in module.functions:
-            passes, builder = self._codegen._function_pass_manager()
-            passes.run(function, builder)
         passes, builder = self._codegen._module_pass_manager()
         passes.run(module, builder)
         module.verify()
@@ -114,20 +126,24 @@ class _EntryLibrary(JITCodeLibrary):  # type: ignore[misc]
         return (self.name, "object", (self._get_compiled_object(), stub.as_bitcode()))
 
 
-def _link_all(module: Any, libraries: list[Any]) -> None:
-    """Link libraries and their dependencies into ``module``, each once."""
+def _link_all(module: Any, libraries: list[Any]) -> tuple[Reference, ...]:
+    """Link libraries and their dependencies into ``module``, each once. Returns the apart kernels among them."""
     done: set[int] = set()
+    references: dict[Reference, None] = {}
     pending = list(libraries)
     while pending:
         library = pending.pop()
         if id(library) in done:
             continue
         done.add(id(library))
-        if isinstance(library, _PieceLibrary):
+        if isinstance(library, Reference):
+            references[library] = None
+        elif isinstance(library, _PieceLibrary):
             module.link_in(library._final_module, preserve=True)
             pending += library._linking_libraries
         else:  # a function of Numba's own
             module.link_in(library._get_module_for_linking(), preserve=True)
+    return tuple(references)
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -157,33 +173,75 @@ class _LinkEntry(LoweringPass):  # type: ignore[misc]
         LoweringPass.__init__(self)
 
     def run_pass(self, state: Any) -> bool:
-        kernel, context = _kernels[state.func_id.func], state.targetctx
-        with kernel.notice():
-            piece = kernel.piece.compiled(state.args)
-            library = _EntryLibrary(context.codegen(), state.func_id.func_qualname)
-            library.enable_object_caching()
-            library.add_linking_library(piece.library)
-            context.create_cpython_wrapper(
-                library, piece.fndesc, piece.environment, piece.call_helper, state.flags.release_gil
-            )
-            function = context.get_executable(library, piece.fndesc, piece.environment)
-            _set_environments(library)
-        state.cr = compile_result(
-            typing_context=state.typingctx,
-            target_context=context,
-            entry_point=function,
-            typing_error=None,
-            library=library,
-            call_helper=piece.call_helper,
-            signature=piece.signature,
-            objectmode=False,
-            lifted=(),
-            fndesc=piece.fndesc,
-            environment=piece.environment,
-            metadata=state.metadata,
-            reload_init=[],
-        )
+        kernel = _kernels[state.func_id.func]
+        with kernel.notice(), kernel.turn(state.args, state.targetctx) as found:
+            state.cr = found or _entry_of(kernel.piece.compiled(state.args), state)
+            if kernel.kept and not found:
+                kernel.store.keep(state.args, state.cr)
         return True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _LinkApart(LoweringPass):  # type: ignore[misc]
+    """Make a function's piece callable by kernels that do not contain it."""
+
+    _name = "renderer_link_apart"
+
+    def __init__(self) -> None:
+        LoweringPass.__init__(self)
+
+    def run_pass(self, state: Any) -> bool:
+        kernel = _kernels[state.func_id.func]
+        store = kernel.apart_store
+        with kernel.notice(), store.turn(state.args, state.targetctx) as found:
+            if not found:
+                compiled = _apart_of(kernel.piece.compiled(state.args), state, store.symbol(state.args))
+                store.keep(state.args, compiled)
+                found = store.callable(state.args, compiled)
+        state.cr = found
+        state.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
+        return True
+
+
+def _library_of(piece: Any, state: Any) -> _EntryLibrary:
+    library = _EntryLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+    library.enable_object_caching()
+    library.add_linking_library(piece.library)
+    return library
+
+
+def _entry_of(piece: Any, state: Any) -> CompileResult:
+    """What Python calls of a piece."""
+    context, library = state.targetctx, _library_of(piece, state)
+    context.create_cpython_wrapper(library, piece.fndesc, piece.environment, piece.call_helper, state.flags.release_gil)
+    function = context.get_executable(library, piece.fndesc, piece.environment)
+    return _result(state, piece, library, entry_point=function, fndesc=piece.fndesc)
+
+
+def _apart_of(piece: Any, state: Any, symbol: str) -> CompileResult:
+    """What kernels call of a piece that they do not contain."""
+    library = _library_of(piece, state)
+    descriptor = write_symbol(library, state.targetctx, piece, symbol)
+    library.finalize()
+    return _result(state, piece, library, entry_point=None, fndesc=descriptor)
+
+
+def _result(state: Any, piece: Any, library: _EntryLibrary, **fields: Any) -> CompileResult:
+    _set_environments(library)
+    return compile_result(
+        typing_context=state.typingctx,
+        target_context=state.targetctx,
+        typing_error=None,
+        library=library,
+        call_helper=piece.call_helper,
+        signature=piece.signature,
+        objectmode=False,
+        lifted=(),
+        environment=piece.environment,
+        metadata=state.metadata,
+        reload_init=list(library.references),
+        **fields,
+    )
 
 
 def _set_environments(library: Any) -> None:
@@ -211,6 +269,11 @@ _PIECE_PASSES = (
 class _PieceCompiler(CompilerBase):  # type: ignore[misc]
     def define_pipelines(self) -> list[PassManager]:
         return [_pipeline("piece", _PIECE_PASSES)]
+
+
+class _ApartCompiler(CompilerBase):  # type: ignore[misc]
+    def define_pipelines(self) -> list[PassManager]:
+        return [_pipeline("apart", (_LinkApart,))]
 
 
 class _EntryCompiler(CompilerBase):  # type: ignore[misc]
@@ -244,15 +307,45 @@ class _Piece(CPUDispatcher):  # type: ignore[misc]
         return super().get_call_template(plain, {k: types.unliteral(v) for k, v in keywords.items()})
 
 
+class _KernelType(types.Dispatcher):  # type: ignore[misc]
+    """The type of a kernel as a value in a kernel, with a name and a way to be read that are those of any process."""
+
+    def __init__(self, kernel: "Kernel") -> None:
+        super().__init__(kernel.apart if kernel.is_apart else kernel.piece)
+        function = kernel.py_func
+        self.name = f"kernel {function.__module__}.{function.__qualname__}"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        function = self.dispatcher.py_func
+        return _type_of, (function.__module__, function.__qualname__)
+
+
+def _type_of(module: str, name: str) -> Any:
+    return getattr(import_module(module), name)._numba_type_
+
+
+@register_model(_KernelType)
+class _KernelModel(OpaqueModel):  # type: ignore[misc]
+    """Nothing: the type says which kernel it is."""
+
+
+@lower_constant(_KernelType)  # type: ignore[untyped-decorator]
+def _nothing(context: Any, builder: Any, kind: Any, kernel: Any) -> Any:
+    return context.get_dummy_value()
+
+
 class Kernel:
     """A function for Python and for kernels; its dispatcher for each is created at the first use.
 
     Creating a Numba dispatcher takes a third of a millisecond, and most kernels need none in a process.
     """
 
-    def __init__(self, function: Callable[..., Any], forceinline: bool = False, kept: bool = True) -> None:
+    def __init__(
+        self, function: Callable[..., Any], forceinline: bool = False, kept: bool = True, is_apart: bool = False
+    ) -> None:
         self.py_func = function
         self.kept = kept
+        self.is_apart = is_apart
         self._options = {**OPTIONS, "forceinline": forceinline}
         _kernels[function] = self
         update_wrapper(self, function)
@@ -274,6 +367,18 @@ class Kernel:
         return _Piece(self.py_func, targetoptions=self._options, pipeline_class=_PieceCompiler)
 
     @lazy
+    def apart(self) -> _Piece:
+        """The dispatcher that kernels call which do not contain it."""
+        apart = _Piece(self.py_func, targetoptions=self._options, pipeline_class=_ApartCompiler)
+        apart._cache = self.apart_store
+        return apart
+
+    @lazy
+    def apart_store(self) -> ApartStore:
+        """The files of its machine code that such kernels call."""
+        return ApartStore(self.py_func)
+
+    @lazy
     def store(self) -> KernelStore:
         """The files of its machine code."""
         return KernelStore(self.py_func)
@@ -281,7 +386,11 @@ class Kernel:
     @property
     def _numba_type_(self) -> Any:
         """Its type in a kernel that calls it, read by Numba."""
-        return types.Dispatcher(self.piece)
+        return _KernelType(self)
+
+    def turn(self, arguments: Any, context: Any) -> AbstractContextManager[CompileResult | None]:
+        """The context in which no other process compiles it, with what one compiled until then."""
+        return self.store.turn(arguments, context) if self.kept else nullcontext()
 
     def notice(self) -> AbstractContextManager[None]:
         """The context in which it is compiled."""

@@ -26,6 +26,12 @@ def inlined(function: Callable[..., Any]) -> Any:
     return _decorated(function, forceinline=True)
 
 
+def apart(function: Callable[..., Any]) -> Any:
+    """A kernel whose machine code is made once for all that call it: for what is large and seldom needed."""
+    compiler = _compiler()
+    return _decorated(function, forceinline=False) if compiler is None else compiler.Kernel(function, is_apart=True)
+
+
 def entry_of(kernel: Any) -> Any:
     """What Python calls of a kernel, to call it in a fifth of a microsecond less."""
     return getattr(kernel, "entry", kernel)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from renderer.jit.decorators import inlined, kernel
+from renderer.jit.decorators import apart, inlined, kernel
 from renderer.numerics.double_double import power_below
 from renderer.numerics.expansions import OUT_OF_RANGE, expand_area, expand_slope, expand_volume, sign_of
 from renderer.numerics.simd import maximum, minimum
@@ -13,7 +13,7 @@ UNDECIDED = 2
 _MOST = 2.0**1000
 
 
-@kernel
+@apart
 def area_sign(a, b, p, parts):
     """The sign of (a - p) x (b - p) of points (x, y), 1, 0, -1, or UNDECIDED; ``parts`` is memory for an expansion."""
     count = expand_area(a, b, p, parts)
@@ -23,13 +23,13 @@ def area_sign(a, b, p, parts):
     return UNDECIDED if count == OUT_OF_RANGE else sign_of(parts, count)
 
 
-@kernel
+@apart
 def volume_sign(a, b, c, p, parts):
     """The sign of (a - p) . ((b - p) x (c - p)), like ``area_sign``."""
     return _sign_in_range(expand_volume, a, b, c, p, parts)
 
 
-@kernel
+@apart
 def slope_sign(a, b, c, d, parts):
     """The sign of ((b - a) x (c - a)) . d, like ``area_sign``."""
     return _sign_in_range(expand_slope, a, b, c, d, parts)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.jit.decorators import inlined, kernel
+from renderer.jit.decorators import apart, inlined, kernel
 from renderer.numerics.double_double import (
     LEAST_NORMAL,
     as_pairs,
@@ -60,7 +60,7 @@ _SLACK = 2.0**-50
 _LEAST = 2.0**-1022
 
 
-@kernel
+@apart
 def resolve_uncertain(tree, at, ray, shear, hit, determinant_uncertain):
     """The ``FaceHit`` that an uncertain hit on the face at ``at`` becomes.
 

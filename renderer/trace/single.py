@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.jit.decorators import inlined, kernel
+from renderer.jit.decorators import apart, inlined, kernel
 from renderer.numerics.kinds import of_none
 from renderer.numerics.simd import (
     LOCAL_WORDS,
@@ -59,7 +59,7 @@ def _visit(tree, query, first, count, found):
     return Found(best, found.steps + count), False
 
 
-@kernel
+@apart
 def search_carefully(tree, rays, i, stack, holders, any_hit):
     """``search_singly`` for ray ``i``, or ``search_from`` if it starts on the surface; the latter ends early for any
     hit.

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.jit.decorators import inlined, kernel
+from renderer.jit.decorators import apart, inlined, kernel
 from renderer.numerics.kinds import of_none
 from renderer.numerics.simd import (
     address,
@@ -300,7 +300,7 @@ def _trace_on(tree, query, progress, end):
     return Progress(end, following, count)
 
 
-@kernel
+@apart
 def trace_rays(tree, rays, found, count, scratch, any_hit):
     """``trace`` of the first ``count`` rays, or ``search_blocks`` where the tree has no nodes."""
     if tree.has_nodes:

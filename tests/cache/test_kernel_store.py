@@ -206,13 +206,43 @@ def test_the_first_compiling_is_said_on_one_line_that_can_be_turned_off(package,
     assert len(done.stderr.splitlines()) == done.stderr.count("renderer: compiling kernels") == told
 
 
-def test_two_processes_that_compile_at_the_same_time_agree(package):
+# Says when it links, which lasts until a line comes, and when it waits for another process.
+SAY = """
+import sys, time
+from renderer.jit import compiler, turns
+sound, sleep = compiler._EntryLibrary.finalize, time.sleep
+def finalize(library):
+    print("links", flush=True)
+    sys.stdin.readline()
+    sound(library)
+def say(seconds):
+    print("waits", flush=True)
+    sleep(seconds)
+compiler._EntryLibrary.finalize, time.sleep = finalize, say
+"""
+
+
+def _says(package, script=""):
     own = {**os.environ, "NUMBA_CACHE_DIR": "", "PYTHONPATH": str(package.parent)}
-    command = [sys.executable, "-B", "-P", "-c", RUN]
-    both = [subprocess.Popen(command, env=own, stdout=subprocess.PIPE, text=True) for _ in range(3)]
-    for process in both:
-        out, _ = process.communicate(timeout=300)
-        assert process.returncode == 0 and out.split()[0] == "17"
+    command = [sys.executable, "-B", "-P", "-c", SAY + script + RUN]
+    return subprocess.Popen(command, env=own, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there nobody waits")
+@pytest.mark.parametrize("how", ["ends", "is killed", "stands still"])
+def test_who_needs_a_kernel_that_another_process_compiles_waits_for_it(package, how):
+    with _says(package) as first:
+        assert first.stdout.readline() == "links\n"
+        with _says(package, "turns._LONGEST = 0.1\n" if how == "stands still" else "") as second:
+            assert second.stdout.readline() == "waits\n"
+            if how == "is killed":
+                first.kill()
+            elif how == "ends":
+                assert first.communicate("\n", timeout=300)[0].split() == COMPILED
+            out, _ = second.communicate("\n", timeout=300)
+            assert out.split()[-3] == "17" and ("links" in out) == (how != "ends")
+        if how == "stands still":
+            assert first.communicate("\n", timeout=300)[0].split() == COMPILED
     assert run(package) == LOADED
 
 

@@ -5,7 +5,7 @@ So the start is known to 2^-100 of the face's size, however far the face is from
 
 from typing import Any, NamedTuple
 
-from renderer.jit.decorators import inlined, kernel
+from renderer.jit.decorators import apart, inlined, kernel
 from renderer.numerics.double_double import (
     LEAST_NORMAL,
     cross_pairs,
@@ -43,7 +43,7 @@ class Anchor(NamedTuple):
     zeros: int
 
 
-@kernel
+@apart
 def anchor_of(start):
     """The exact start: the point of the given barycentrics, or the point of the face nearest to the given one.
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from renderer.jit.decorators import inlined, kernel
+from renderer.jit.decorators import apart, inlined, kernel
 from renderer.numerics.double_double import as_pairs, cross_pairs, dot_pairs, power_below, quotient, scaled_difference
 from renderer.numerics.simd import local_doubles, lowest_bit, maximum, minimum, pointer, store
 from renderer.numerics.vec3 import add, largest_component, sub
@@ -159,7 +159,7 @@ class Departure(NamedTuple):
     holders: int
 
 
-@kernel
+@apart
 def depart(tree, starts, i, ray, stack, memory):
     """The ``Departure`` of ray ``i``, and the ``Best`` hit that stops it at its start.
 
@@ -187,7 +187,7 @@ def depart(tree, starts, i, ray, stack, memory):
     return Departure(ray, anchor, d, slope, unit, not at_corner, count), stopped
 
 
-@kernel
+@apart
 def stopped_again(tree, departure, face, pile, memory):
     """The hit that stops a ray at its start after it went through ``face`` there; otherwise as ``depart``, with the
     same ``memory``. ``pile`` is the first of the faces that coincide with it.
@@ -267,7 +267,7 @@ def _visit(tree, query, first, count, found):
     return Found(best, found.steps + count), query.any_hit and best.face != NO_FACE
 
 
-@kernel
+@apart
 def t_from(tree, starts, i, ray, face, t):
     """t from the exact start for the plane of a face that the ray hits at t."""
     anchor, (d, unit) = anchor_of(start_at(tree, starts, i)), unit_direction((ray.dx, ray.dy, ray.dz))
@@ -294,7 +294,7 @@ def counted_from_start(tree, starts, i, ray, largest, hit, face):
     return hit
 
 
-@kernel
+@apart
 def take_side(tree, starts, n, stack, memory, table, room):
     """Write to the row of a start the side of its face that the normal n selects; or the side of another face, if its
     own does not bound that region. Also write its ``fan`` to ``table``, if ``room`` float64 suffice. If n selects
