@@ -212,8 +212,8 @@ def touch_viewing(prepared: PreparedScene) -> None:
 
 
 def compile_in_two(textures: bool = False) -> None:
-    """Before a first picture, or one with ``textures``: compile the kernels that build trees here and those that render
-    in another process.
+    """Before a first picture, or one with ``textures``: compile the kernels that build trees and what the others search
+    carefully with here, and those that render in another process.
 
     Does nothing if they are on disk. If the other process fails, its last line of output is logged, and its kernels are
     compiled here when needed.
@@ -230,6 +230,8 @@ def compile_in_two(textures: bool = False) -> None:
         text=True,
     ) as other:
         try:
+            # First what the other process needs later than this one has it.
+            BruteForce.from_mesh(_TRIANGLE).closest_hit([0.1, 0.1, 0.0], [0.0, 0.0, 1.0], leaving=0)
             _build()
             # The child reads its input to the end, so that must stay open: no communicate().
             assert other.stderr is not None

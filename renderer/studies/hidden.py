@@ -145,7 +145,8 @@ def occlusion(
     Points on the surface need no epsilon. A point is on the surface if it is within 32 roundings of float64 of its
     largest coordinate, or, if float32 holds all its coordinates, within 8 of its own roundings to float32. A point
     that is farther off, up to the error of float32, lies on the face that `leaving` names. Rays start at the nearest
-    point of the face.
+    point of the face. A point as near to an edge or corner is on it, and so on all faces that meet there; for queries
+    with `leaving` it is where its coordinates say.
 
     The normal says on which side of its faces a point lies: directions that lead through them to the other side are
     hidden. Without a normal the faces that hold the point hide nothing.
