@@ -64,10 +64,15 @@ class ApartStore(KernelStore):
 
 
 def write_symbol(library: Any, context: Any, piece: Any, symbol: str) -> Any:
-    """Add a function to a library, which calls a piece and has a symbol; returns its descriptor."""
+    """Add a function to a library, which calls a piece and has a symbol; returns its descriptor.
+
+    Raises ``TypeError`` for a vector among its arguments, which code for another level would pass in other registers.
+    """
     descriptor = copy.copy(piece.fndesc)
     descriptor.mangled_name = symbol
     kind = context.call_conv.get_function_type(descriptor.restype, descriptor.argtypes)
+    if any(isinstance(argument, ir.VectorType) for argument in kind.args):
+        raise TypeError(f"{symbol}: expected numbers and pointers as arguments of a kernel apart, got a vector")
     module = library.create_ir_module("apart")
     inner, outer = (ir.Function(module, kind, name) for name in (piece.fndesc.mangled_name, symbol))
     builder = ir.IRBuilder(outer.append_basic_block())

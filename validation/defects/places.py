@@ -13,7 +13,7 @@ from pathlib import Path
 
 _MARK = re.compile(r"^\s*# rule: (\S+)$")
 # The decorators of functions that are compiled.
-_COMPILED = ("kernel", "inlined", "intrinsic")
+_COMPILED = ("kernel", "inlined", "apart", "intrinsic")
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,108 @@
+"""Kernels whose machine code is apart: one file for all that call them, and for each process."""
+
+import os
+import sys
+
+import pytest
+from kernel_package import run, write_package
+
+APART = """
+from renderer.jit.decorators import apart, inlined
+from renderer.below.deep.bottom import STEP
+@inlined
+def one(x):
+    return x + STEP
+@apart
+def deepest(x, change):
+    return change(x)
+@apart
+def deep(x, change):
+    return 2 * deepest(x, change)
+"""
+CALLERS = """
+from renderer.jit.decorators import kernel
+from renderer.far import deep, deepest, one
+@kernel
+def first(x):
+    return deep(x, one) + 1
+@kernel
+def second(x):
+    return deep(x, one) + deepest(x, one) + 2
+"""
+# Prints the answers, and for each kernel how often it was compiled.
+RUN = """
+from renderer.callers import first, second
+from renderer.far import deep, deepest
+kernels = deepest.apart, deep.apart, first.entry, second.entry
+print(first(3), second(3), *(sum(kernel.stats.cache_misses.values()) for kernel in kernels))
+"""
+COMPILED, LOADED = ["27", "41", "1", "1", "1", "1"], ["27", "41", "0", "0", "0", "0"]
+
+
+@pytest.fixture
+def package(tmp_path):
+    folder = write_package(tmp_path)
+    (folder / "far.py").write_text(APART)
+    (folder / "callers.py").write_text(CALLERS)
+    return folder
+
+
+def test_each_is_compiled_once_and_read_with_its_callers(package):
+    assert run(package, RUN) == COMPILED
+    assert run(package, RUN) == LOADED
+    (package / "far.py").write_text(APART.replace("2 * deepest", "3 * deepest"))
+    assert run(package, RUN) == ["40", "54", "1", "1", "1", "1"]
+
+
+def test_one_whose_file_is_gone_is_made_anew_alone(package):
+    assert run(package, RUN) == COMPILED
+    (lost,) = (package / "__pycache__").glob("*deepest.apart-*.kernel")
+    lost.unlink()
+    assert run(package, RUN) == ["27", "41", "1", "0", "0", "0"]
+    assert run(package, RUN) == LOADED
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there nobody waits")
+def test_who_compiles_one_still_holds_its_caller(package):
+    """The system frees all that a process locked in a file when it closes the file once."""
+    inside = """
+import subprocess, sys
+from pathlib import Path
+from renderer.jit import turns
+def held(name):
+    with turns.turn(Path(), name) as waited:
+        return waited
+turns._LONGEST = 0.1
+if len(sys.argv) > 1:
+    print(held("outer"), held("inner"))
+else:
+    with turns.turn(Path(), "outer"):
+        held("inner")
+        subprocess.run([sys.executable, "-B", "-P", __file__, "again"], check=True)
+    print(held("outer"))
+"""
+    script = package.parent / "inside.py"
+    script.write_text(inside)
+    program = f"import subprocess, sys; subprocess.run([sys.executable, '-B', '-P', {os.fspath(script)!r}], check=True)"
+    assert run(package, program) == ["True", "False", "False"]
+
+
+def test_a_vector_is_refused(package):
+    """Code for another level of processor passes it in other registers."""
+    (package / "far.py").write_text("""
+from renderer.jit.decorators import apart
+from renderer.numerics.simd import extract
+@apart
+def deep(x):
+    return extract(x, 0)
+""")
+    (package / "callers.py").write_text("""
+from renderer.jit.decorators import kernel
+from renderer.far import deep
+from renderer.numerics.simd import splat4
+@kernel
+def first(x):
+    return deep(splat4(x))
+""")
+    program = "from renderer.callers import first\ntry: first(3.0)\nexcept Exception as error: print(error)"
+    assert "got a vector" in " ".join(run(package, program))
