@@ -2,15 +2,23 @@
 
 import copy
 import hashlib
+import sys
 from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
 from llvmlite import ir
+from numba.core import types
 from numba.core.compiler import CompileResult
 
 from renderer.jit.cache import KernelStore
+from renderer.jit.digest import source_digest
+
+# In place of a digest that is unknown: no other process finds what has it in its name.
+_ONCE = uuid4().hex
 
 
 @dataclass(frozen=True)
@@ -19,17 +27,31 @@ class Reference:
 
     module, name  where the kernel is
     arguments     Numba's types of its arguments
+    symbol        the name by which the caller calls it
+    kept          whether another process finds the same kernel there
     """
 
     module: str
     name: str
     arguments: tuple[Any, ...]
+    symbol: str
+    kept: bool
 
     def __call__(self) -> None:
-        getattr(import_module(self.module), self.name).apart.compiled(self.arguments)
+        found = getattr(import_module(self.module), self.name).apart
+        if found.compiled(self.arguments).fndesc.mangled_name != self.symbol:
+            raise RuntimeError(f"{self.module}.{self.name} has changed since its caller was compiled")
+
+    @property
+    def _reload_init(self) -> set["Reference"]:
+        """What Numba calls before it loads a function that links this one."""
+        return {self}
 
     def _ensure_finalized(self) -> None:
         """Nothing: Numba asks this of what it links."""
+
+    def _get_module_for_linking(self) -> Any:
+        return llvm.parse_assembly("")
 
 
 class ApartStore(KernelStore):
@@ -40,9 +62,15 @@ class ApartStore(KernelStore):
         self._name += ".apart"
 
     def symbol(self, signature: Any) -> str:
-        """The name by which callers call it."""
-        text = f"{signature} {self._digest}"
+        """The name by which callers call it; one of this process alone if it is not kept."""
+        text = "\0".join(self._key(signature, ()))
+        if self._digest is None:
+            text += f" {id(self._function)}"
         return f"octree_renderer.{self._name}.{hashlib.sha256(text.encode()).hexdigest()[:16]}"
+
+    def _key(self, signature: Any, machine: tuple[str, ...]) -> tuple[str, ...]:
+        """With the sources of the kernels and classes among the arguments, which its own file need not import."""
+        return (*super()._key(signature, machine), *sorted(str(digest or _ONCE) for digest in _digests(signature)))
 
     def _rebuilt(self, signature: Any, context: Any, payload: Any) -> CompileResult:
         stored, descriptor, _, result, _, _, _, references, environments = payload
@@ -57,10 +85,33 @@ class ApartStore(KernelStore):
 
     def callable(self, signature: Any, compiled: CompileResult) -> CompileResult:
         """A compiled apart kernel as other kernels call it."""
-        symbol = compiled.fndesc.mangled_name
+        symbol, function = compiled.fndesc.mangled_name, self._function
         llvm.add_symbol(symbol, compiled.library.get_pointer_to_function(symbol))
-        reference = Reference(self._function.__module__, self._function.__qualname__, tuple(signature))
+        named = getattr(sys.modules.get(function.__module__), function.__qualname__, None)
+        known = self._digest is not None and None not in _digests(signature)
+        kept = known and getattr(named, "py_func", None) is function
+        reference = Reference(function.__module__, function.__qualname__, tuple(signature), symbol, kept)
         return compiled._replace(library=reference, entry_point=object())
+
+
+def _digests(signature: Any) -> set[str | None]:
+    """The digests of those files, None where one is unknown."""
+    return {source_digest(Path(file)) for file in _files(signature)}
+
+
+def _files(signature: Any) -> set[str]:
+    """The source files of the kernels and of the named tuples' classes among types, at any depth."""
+    files: set[str] = set()
+    pending = list(signature)
+    while pending:
+        one = pending.pop()
+        if isinstance(one, types.Dispatcher):
+            files.add(one.dispatcher.py_func.__code__.co_filename)
+        if isinstance(one, types.BaseNamedTuple):
+            files.add(str(sys.modules[one.instance_class.__module__].__file__))
+        if isinstance(one, types.BaseTuple):
+            pending += one
+    return files
 
 
 def write_symbol(library: Any, context: Any, piece: Any, symbol: str) -> Any:

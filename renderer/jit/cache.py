@@ -28,7 +28,7 @@ from numba.core.serialize import dumps
 
 from renderer.jit.digest import PACKAGE, is_ours, source_digest
 from renderer.jit.levels import AHEAD_VARIABLE, LEVELS, lacking
-from renderer.jit.turns import turn
+from renderer.jit.turns import turn, wait_no_more
 from renderer.lazy import lazy
 from renderer.system.files import write_atomically
 
@@ -112,7 +112,11 @@ class KernelStore:
             return
         name = self._file(self._key(signature, context.codegen().magic_tuple()))
         with turn(_folders(self._home).written, name) as waited:
-            yield self.load_overload(signature, context) if waited else None
+            found = self.load_overload(signature, context)
+            if waited and found is None:
+                # Who was waited for stands still, was killed or cannot write: the next will be no better.
+                wait_no_more()
+            yield found
 
     def save_overload(self, signature: Any, compiled: CompileResult) -> None:
         """Nothing: ``keep`` was called before."""

@@ -38,7 +38,7 @@ from numba.core.typed_passes import (
 from numba.core.untyped_passes import FixupArgs, GenericRewrites, IRProcessing, ReconstructSSA, TranslateByteCode
 from numba.extending import register_model
 
-from renderer.jit.apart import ApartStore, Reference, write_symbol
+from renderer.jit.apart import ApartStore, write_symbol
 from renderer.jit.cache import KernelStore
 from renderer.jit.notice import compiling
 from renderer.lazy import lazy
@@ -78,6 +78,8 @@ class _PieceLibrary(JITCodeLibrary):  # type: ignore[misc]
             if not function.is_declaration:
                 passes, builder = self._codegen._function_pass_manager()
                 passes.run(function, builder)
+        for library in self._linking_libraries:
+            self._reload_init |= library._reload_init
         self._finalized = True
 
     def _get_module_for_linking(self) -> Any:
@@ -93,12 +95,7 @@ class _PieceLibrary(JITCodeLibrary):  # type: ignore[misc]
 
 
 class _EntryLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """A wrapper for Python, or a function with a symbol, and all pieces behind it, optimised together.
-
-    references  the apart kernels that it calls
-    """
-
-    references: tuple[Reference, ...] = ()
+    """A wrapper for Python, or a function with a symbol, and all pieces behind it, optimised together."""
 
     def _optimize_functions(self, module: Any) -> None:
         module.data_layout = self._codegen._data_layout
@@ -107,7 +104,7 @@ class _EntryLibrary(JITCodeLibrary):  # type: ignore[misc]
         self._codegen._check_llvm_bugs()
         module = self._final_module
         outer = [function.name for function in module.functions if not function.is_declaration]
-        self.references = _link_all(module, self._linking_libraries)
+        _link_all(module, self._linking_libraries)
         for function in module.functions:
             if not function.is_declaration and function.name not in outer:
                 # Private, so that it is dropped where it is inlined everywhere, and has no symbol. An internal function
@@ -126,24 +123,20 @@ class _EntryLibrary(JITCodeLibrary):  # type: ignore[misc]
         return (self.name, "object", (self._get_compiled_object(), stub.as_bitcode()))
 
 
-def _link_all(module: Any, libraries: list[Any]) -> tuple[Reference, ...]:
-    """Link libraries and their dependencies into ``module``, each once. Returns the apart kernels among them."""
+def _link_all(module: Any, libraries: list[Any]) -> None:
+    """Link libraries and their dependencies into ``module``, each once."""
     done: set[int] = set()
-    references: dict[Reference, None] = {}
     pending = list(libraries)
     while pending:
         library = pending.pop()
         if id(library) in done:
             continue
         done.add(id(library))
-        if isinstance(library, Reference):
-            references[library] = None
-        elif isinstance(library, _PieceLibrary):
+        if isinstance(library, _PieceLibrary):
             module.link_in(library._final_module, preserve=True)
             pending += library._linking_libraries
         else:  # a function of Numba's own
             module.link_in(library._get_module_for_linking(), preserve=True)
-    return tuple(references)
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -177,7 +170,7 @@ class _LinkEntry(LoweringPass):  # type: ignore[misc]
         with kernel.notice(), kernel.turn(state.args, state.targetctx) as found:
             state.cr = found or _entry_of(kernel.piece.compiled(state.args), state)
             if kernel.kept and not found:
-                kernel.store.keep(state.args, state.cr)
+                _keep(kernel.store, state.args, state.cr)
         return True
 
 
@@ -196,11 +189,17 @@ class _LinkApart(LoweringPass):  # type: ignore[misc]
         with kernel.notice(), store.turn(state.args, state.targetctx) as found:
             if not found:
                 compiled = _apart_of(kernel.piece.compiled(state.args), state, store.symbol(state.args))
-                store.keep(state.args, compiled)
+                _keep(store, state.args, compiled)
                 found = store.callable(state.args, compiled)
         state.cr = found
         state.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
         return True
+
+
+def _keep(store: KernelStore, arguments: Any, compiled: CompileResult) -> None:
+    """Write a kernel, unless another process would not find what it calls."""
+    if all(getattr(called, "kept", True) for called in compiled.reload_init):
+        store.keep(arguments, compiled)
 
 
 def _library_of(piece: Any, state: Any) -> _EntryLibrary:
@@ -239,7 +238,7 @@ def _result(state: Any, piece: Any, library: _EntryLibrary, **fields: Any) -> Co
         lifted=(),
         environment=piece.environment,
         metadata=state.metadata,
-        reload_init=list(library.references),
+        reload_init=list(piece.library._reload_init),
         **fields,
     )
 
