@@ -95,23 +95,23 @@ class ApartStore(KernelStore):
 
 
 def _digests(signature: Any) -> set[str | None]:
-    """The digests of those files, None where one is unknown."""
-    return {source_digest(Path(file)) for file in _files(signature)}
+    """The digests of the sources of kernels and of named tuples' classes among types, at any depth.
 
-
-def _files(signature: Any) -> set[str]:
-    """The source files of the kernels and of the named tuples' classes among types, at any depth."""
-    files: set[str] = set()
+    None where one is unknown, as that of a nested kernel.
+    """
+    digests: set[str | None] = set()
     pending = list(signature)
     while pending:
         one = pending.pop()
         if isinstance(one, types.Dispatcher):
-            files.add(one.dispatcher.py_func.__code__.co_filename)
+            function = one.dispatcher.py_func
+            nested = "<locals>" in function.__qualname__
+            digests.add(None if nested else source_digest(Path(function.__code__.co_filename)))
         if isinstance(one, types.BaseNamedTuple):
-            files.add(str(sys.modules[one.instance_class.__module__].__file__))
+            digests.add(source_digest(Path(str(sys.modules[one.instance_class.__module__].__file__))))
         if isinstance(one, types.BaseTuple):
             pending += one
-    return files
+    return digests
 
 
 def write_symbol(library: Any, context: Any, piece: Any, symbol: str) -> Any:

@@ -189,8 +189,9 @@ class _LinkApart(LoweringPass):  # type: ignore[misc]
         with kernel.notice(), store.turn(state.args, state.targetctx) as found:
             if not found:
                 compiled = _apart_of(kernel.piece.compiled(state.args), state, store.symbol(state.args))
-                _keep(store, state.args, compiled)
                 found = store.callable(state.args, compiled)
+                if found.library.kept:
+                    _keep(store, state.args, compiled)
         state.cr = found
         state.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
         return True

@@ -54,6 +54,81 @@ def test_each_is_compiled_once_and_read_with_its_callers(package):
     assert run(package, RUN) == ["40", "54", "1", "1", "1", "1"]
 
 
+def test_it_follows_the_sources_of_kernels_and_classes_that_it_gets(package):
+    """Which its own file does not import: their sources decide what it does all the same."""
+    far = """
+from renderer.jit.decorators import apart
+@apart
+def deep(x, step, place):
+    return step(x) + place.x
+"""
+    (package / "far.py").write_text(far)
+    step = """
+from typing import Any, NamedTuple
+from renderer.jit.decorators import inlined
+class Place(NamedTuple):
+    x: Any
+    y: Any
+@inlined
+def step(x):
+    return 10 * x
+"""
+    (package / "step.py").write_text(step)
+    (package / "callers.py").write_text("""
+from renderer.jit.decorators import kernel
+from renderer.far import deep
+from renderer.step import Place, step
+@kernel
+def first(x):
+    return deep(x, step, Place(x=1, y=2))
+""")
+    program = "from renderer.callers import first; print(first(3))"
+    assert run(package, program) == ["31"]
+    (package / "step.py").write_text(step.replace("10 * x", "20 * x"))
+    assert run(package, program) == ["61"]
+    (package / "step.py").write_text(step.replace("    x: Any\n    y: Any\n", "    y: Any\n    x: Any\n"))
+    assert run(package, program) == ["31"]
+
+
+def test_a_caller_of_one_that_is_not_kept_is_not_kept(package):
+    """Its symbol is that of one process; the next one aborted."""
+    assert run(package, "import os, renderer.jit.digest\nos.utime('renderer/far.py')\n" + RUN)[:2] == COMPILED[:2]
+    assert run(package, RUN) == COMPILED
+
+
+@pytest.mark.parametrize("called", ["deepest", "first"])
+def test_a_function_of_numba_s_own_calls_it_and_is_kept_by_numba(package, called):
+    """Read from Numba's cache it called a symbol that nobody knew."""
+    own = f"""
+import numba
+from renderer.callers import first
+from renderer.far import deepest, one
+@numba.njit(cache=True)
+def own(x):
+    return {called}(x{", one" if called == "deepest" else ""})
+print(own(3), sum(own.stats.cache_misses.values()))
+"""
+    (package.parent / "own.py").write_text(own)
+    answer = "13" if called == "deepest" else "27"
+    assert [run(package, "import own") for _ in range(2)] == [[answer, "1"], [answer, "0"]]
+
+
+def test_two_of_one_name_are_told_apart(package):
+    (package / "far.py").write_text("""
+from renderer.jit.decorators import apart, kernel
+def made(step):
+    @apart
+    def deep(x):
+        return x + step
+    return deep
+one, other = made(100), made(300)
+@kernel
+def both(x):
+    return one(x) + other(x)
+""")
+    assert run(package, "from renderer.far import both; print(both(1))") == ["402"]
+
+
 def test_one_whose_file_is_gone_is_made_anew_alone(package):
     assert run(package, RUN) == COMPILED
     (lost,) = (package / "__pycache__").glob("*deepest.apart-*.kernel")
