@@ -12,13 +12,10 @@ from uuid import uuid4
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
 from llvmlite import ir
 from numba.core import types
-from numba.core.compiler import CompileResult
+from numba.core.compiler import CompileResult, compile_result
 
-from renderer.jit.cache import KernelStore
+from renderer.jit.cache import KernelStore, digest_of
 from renderer.jit.digest import source_digest
-
-# In place of a digest that is unknown: no other process finds what has it in its name.
-_ONCE = uuid4().hex
 
 
 @dataclass(frozen=True)
@@ -62,15 +59,19 @@ class ApartStore(KernelStore):
         self._name += ".apart"
 
     def symbol(self, signature: Any) -> str:
-        """The name by which callers call it; one of this process alone if it is not kept."""
-        text = "\0".join(self._key(signature, ()))
-        if self._digest is None:
-            text += f" {id(self._function)}"
+        """The name by which callers call it; a new one if no file can stand for it."""
+        text = "\0".join(self._key(signature, ())) if self.knows(signature) else uuid4().hex
         return f"octree_renderer.{self._name}.{hashlib.sha256(text.encode()).hexdigest()[:16]}"
+
+    def knows(self, signature: Any) -> bool:
+        """Also that its callers find it by its name, and the sources of its arguments' types."""
+        named = getattr(sys.modules.get(self._function.__module__), self._function.__qualname__, None)
+        found = getattr(named, "py_func", None) is self._function
+        return found and super().knows(signature) and None not in _digests(signature)
 
     def _key(self, signature: Any, machine: tuple[str, ...]) -> tuple[str, ...]:
         """With the sources of the kernels and classes among the arguments, which its own file need not import."""
-        return (*super()._key(signature, machine), *sorted(str(digest or _ONCE) for digest in _digests(signature)))
+        return (*super()._key(signature, machine), *sorted(str(digest) for digest in _digests(signature)))
 
     def _rebuilt(self, signature: Any, context: Any, payload: Any) -> CompileResult:
         stored, descriptor, _, result, _, _, _, references, environments = payload
@@ -79,17 +80,15 @@ class ApartStore(KernelStore):
         library = context.codegen().unserialize_library(stored)
         for one in environments:
             library.codegen.set_env(one.env_name, one)
-        compiled = CompileResult(*(None,) * len(CompileResult._fields))
-        compiled = compiled._replace(library=library, fndesc=descriptor, signature=result, objectmode=False)
-        return self.callable(signature, compiled)
+        return self.callable(
+            signature, compile_result(library=library, fndesc=descriptor, signature=result, objectmode=False)
+        )
 
     def callable(self, signature: Any, compiled: CompileResult) -> CompileResult:
         """A compiled apart kernel as other kernels call it."""
         symbol, function = compiled.fndesc.mangled_name, self._function
         llvm.add_symbol(symbol, compiled.library.get_pointer_to_function(symbol))
-        named = getattr(sys.modules.get(function.__module__), function.__qualname__, None)
-        known = self._digest is not None and None not in _digests(signature)
-        kept = known and getattr(named, "py_func", None) is function
+        kept = self.knows(signature)
         reference = Reference(function.__module__, function.__qualname__, tuple(signature), symbol, kept)
         return compiled._replace(library=reference, entry_point=object())
 
@@ -104,9 +103,7 @@ def _digests(signature: Any) -> set[str | None]:
     while pending:
         one = pending.pop()
         if isinstance(one, types.Dispatcher):
-            function = one.dispatcher.py_func
-            nested = "<locals>" in function.__qualname__
-            digests.add(None if nested else source_digest(Path(function.__code__.co_filename)))
+            digests.add(digest_of(one.dispatcher.py_func))
         if isinstance(one, types.BaseNamedTuple):
             digests.add(source_digest(Path(str(sys.modules[one.instance_class.__module__].__file__))))
         if isinstance(one, types.BaseTuple):

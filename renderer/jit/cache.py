@@ -71,11 +71,12 @@ class KernelStore:
 
     @lazy
     def _digest(self) -> str | None:
-        """The digest of the files that the kernel's code depends on; None if that is unknown.
+        """The digest of the files that the kernel's code depends on; None if that is unknown."""
+        return digest_of(self._function)
 
-        A nested function stands for many functions of the same text.
-        """
-        return None if "<locals>" in self._function.__qualname__ else source_digest(self._source)
+    def knows(self, signature: Any) -> bool:
+        """Whether files can stand for the kernel compiled for these types: all sources that decide it are known."""
+        return self._digest is not None
 
     def is_stored(self) -> bool:
         """Whether a file of these sources exists for any argument types, so that a later run need not compile.
@@ -90,7 +91,7 @@ class KernelStore:
 
     def load_overload(self, signature: Any, context: Any) -> CompileResult | None:
         """The kernel compiled for the types in ``signature``, or None if it must be compiled."""
-        if self._digest is None:
+        if not self.knows(signature):
             return None
         for path, key in self._places(signature, context.codegen().magic_tuple()):
             payload = _read(path, key)
@@ -107,7 +108,7 @@ class KernelStore:
         """A context in which no other process compiles the kernel for these types; yields the one that another process
         has written meanwhile, or None.
         """
-        if self._digest is None:
+        if not self.knows(signature):
             yield None
             return
         name = self._file(self._key(signature, context.codegen().magic_tuple()))
@@ -124,7 +125,7 @@ class KernelStore:
     def keep(self, signature: Any, compiled: CompileResult) -> None:
         """Write a kernel for other processes, and remove those compiled from other sources."""
         folder = _folders(self._home).written
-        if folder is None or self._digest is None or compiled.library.has_dynamic_globals:
+        if folder is None or not self.knows(signature) or compiled.library.has_dynamic_globals:
             _Count.lost += 1
             return
         key = self._key(signature, compiled.library.codegen.magic_tuple())
@@ -161,6 +162,14 @@ class KernelStore:
 
     def _file(self, key: tuple[str, ...]) -> str:
         return f"{self._prefix()}{_short(key[1])}-{_hash(key)}{_SUFFIX}"
+
+
+def digest_of(function: Any) -> str | None:
+    """The digest of the files that the code of a kernel depends on; None if that is unknown.
+
+    A nested function stands for many functions of the same text.
+    """
+    return None if "<locals>" in function.__qualname__ else source_digest(Path(function.__code__.co_filename))
 
 
 def keep_in(folder: Path) -> None:

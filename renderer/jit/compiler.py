@@ -156,45 +156,54 @@ class _LowerPiece(NativeLowering):  # type: ignore[misc]
         return True
 
 
+class _Link(LoweringPass):  # type: ignore[misc]
+    """Link a function's piece with all below it, unless another process did so meanwhile."""
+
+    def __init__(self) -> None:
+        LoweringPass.__init__(self)
+
+    def run_pass(self, state: Any) -> bool:
+        kernel = _kernels[state.func_id.func]
+        store = self._store_of(kernel)
+        with kernel.notice(), store.turn(state.args, state.targetctx) as found:
+            state.cr = found or self._linked(kernel, store, state)
+        return True
+
+
 @register_pass(mutates_CFG=True, analysis_only=False)
-class _LinkEntry(LoweringPass):  # type: ignore[misc]
+class _LinkEntry(_Link):
     """Make a function's piece callable by Python."""
 
     _name = "renderer_link_entry"
 
-    def __init__(self) -> None:
-        LoweringPass.__init__(self)
+    def _store_of(self, kernel: "Kernel") -> KernelStore:
+        return kernel.store
 
-    def run_pass(self, state: Any) -> bool:
-        kernel = _kernels[state.func_id.func]
-        with kernel.notice(), kernel.turn(state.args, state.targetctx) as found:
-            state.cr = found or _entry_of(kernel.piece.compiled(state.args), state)
-            if kernel.kept and not found:
-                _keep(kernel.store, state.args, state.cr)
-        return True
+    def _linked(self, kernel: "Kernel", store: KernelStore, state: Any) -> CompileResult:
+        compiled = _entry_of(kernel.piece.compiled(state.args), state)
+        if kernel.kept:
+            _keep(store, state.args, compiled)
+        return compiled
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
-class _LinkApart(LoweringPass):  # type: ignore[misc]
+class _LinkApart(_Link):
     """Make a function's piece callable by kernels that do not contain it."""
 
     _name = "renderer_link_apart"
 
-    def __init__(self) -> None:
-        LoweringPass.__init__(self)
-
     def run_pass(self, state: Any) -> bool:
-        kernel = _kernels[state.func_id.func]
-        store = kernel.apart_store
-        with kernel.notice(), store.turn(state.args, state.targetctx) as found:
-            if not found:
-                compiled = _apart_of(kernel.piece.compiled(state.args), state, store.symbol(state.args))
-                found = store.callable(state.args, compiled)
-                if found.library.kept:
-                    _keep(store, state.args, compiled)
-        state.cr = found
-        state.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
+        super().run_pass(state)
+        state.targetctx.insert_user_function(state.cr.entry_point, state.cr.fndesc, [state.cr.library])
         return True
+
+    def _store_of(self, kernel: "Kernel") -> ApartStore:
+        return kernel.apart_store
+
+    def _linked(self, kernel: "Kernel", store: ApartStore, state: Any) -> CompileResult:
+        compiled = _apart_of(kernel.piece.compiled(state.args), state, store.symbol(state.args))
+        _keep(store, state.args, compiled)
+        return store.callable(state.args, compiled)
 
 
 def _keep(store: KernelStore, arguments: Any, compiled: CompileResult) -> None:
@@ -387,10 +396,6 @@ class Kernel:
     def _numba_type_(self) -> Any:
         """Its type in a kernel that calls it, read by Numba."""
         return _KernelType(self)
-
-    def turn(self, arguments: Any, context: Any) -> AbstractContextManager[CompileResult | None]:
-        """The context in which no other process compiles it, with what one compiled until then."""
-        return self.store.turn(arguments, context) if self.kept else nullcontext()
 
     def notice(self) -> AbstractContextManager[None]:
         """The context in which it is compiled."""

@@ -28,8 +28,7 @@ def inlined(function: Callable[..., Any]) -> Any:
 
 def apart(function: Callable[..., Any]) -> Any:
     """A kernel whose machine code is made once for all that call it: for what is large and seldom needed."""
-    compiler = _compiler()
-    return _decorated(function, forceinline=False) if compiler is None else compiler.Kernel(function, is_apart=True)
+    return _decorated(function, forceinline=False, is_apart=True)
 
 
 def entry_of(kernel: Any) -> Any:
@@ -46,11 +45,11 @@ def is_on_disk(kernel: Any) -> bool:
     return store is None or bool(store.is_stored())
 
 
-def _decorated(function: Callable[..., Any], forceinline: bool) -> Any:
+def _decorated(function: Callable[..., Any], forceinline: bool, is_apart: bool = False) -> Any:
     compiler = _compiler()
     if compiler is None:
         return numba.njit(nogil=True, error_model="numpy", forceinline=forceinline)(function)
-    return compiler.Kernel(function, forceinline)
+    return compiler.Kernel(function, forceinline, is_apart=is_apart)
 
 
 @cache

@@ -131,6 +131,24 @@ def both(x):
     assert run(package, "from renderer.far import both; print(both(1))") == ["402"]
 
 
+def test_two_kernels_of_one_name_that_it_gets_are_told_apart(package):
+    (package / "callers.py").write_text("""
+from renderer.jit.decorators import inlined, kernel
+from renderer.far import deep
+def made(step):
+    @inlined
+    def add(x):
+        return x + step
+    return add
+one, other = made(100), made(300)
+@kernel
+def both(x):
+    return deep(x, one) + deep(x, other)
+""")
+    done = start(package, "from renderer.callers import both; print(both(1))")
+    assert done.stdout.split() == ["804"] and "damaged" not in done.stderr
+
+
 def test_one_whose_file_is_gone_is_made_anew_alone(package):
     assert run(package, RUN) == COMPILED
     (lost,) = (package / "__pycache__").glob("*deepest.apart-*.kernel")
