@@ -2,9 +2,15 @@
 
 import os
 import sys
+from contextlib import nullcontext
 
 import pytest
 from kernel_package import run, start, write_package
+from numba.core.registry import cpu_target
+
+from renderer.jit import cache, turns
+from renderer.jit.cache import KernelStore
+from renderer.numerics.vec3 import add
 
 APART = """
 from renderer.jit.decorators import apart, inlined
@@ -98,6 +104,20 @@ def test_a_caller_of_one_that_is_not_kept_is_not_kept(package):
     assert done.stdout.split() == COMPILED and "damaged" not in done.stderr
 
 
+def test_a_caller_in_another_package_does_not_call_what_was_edited(package):
+    """Its file stays, as it follows only its own source and ours; the symbol in it is gone."""
+    far = "from renderer.jit.decorators import apart\n@apart\ndef deep(x):\n    return x + 5\n"
+    (package.parent / "theirs.py").write_text(far)
+    mine = (
+        "from renderer.jit.decorators import kernel\nfrom theirs import deep\n@kernel\ndef first(x): return deep(x)\n"
+    )
+    (package.parent / "mine.py").write_text(mine)
+    program = "from mine import first; print(first(3))"
+    assert run(package, program) == ["8"]
+    (package.parent / "theirs.py").write_text(far.replace("+ 5", "+ 50"))
+    assert run(package, program) == ["53"]
+
+
 @pytest.mark.parametrize("called", ["deepest", "first"])
 def test_a_function_of_numba_s_own_calls_it_and_is_kept_by_numba(package, called):
     """Read from Numba's cache it called a symbol that nobody knew."""
@@ -180,6 +200,18 @@ else:
     script.write_text(inside)
     program = f"import subprocess, sys; subprocess.run([sys.executable, '-B', '-P', {os.fspath(script)!r}], check=True)"
     assert run(package, program) == ["True", "False", "False"]
+
+
+@pytest.mark.parametrize("found", [None, "a kernel"])
+def test_who_waited_in_vain_waits_no_more(monkeypatch, found):
+    """Where nothing can be written, each of four processes waited for each kernel, and then compiled it."""
+    store = KernelStore(add.py_func)
+    monkeypatch.setattr(turns._Patience, "left", True)
+    monkeypatch.setattr(cache, "turn", lambda folder, name: nullcontext(True))
+    monkeypatch.setattr(store, "load_overload", lambda signature, context: found)
+    with store.turn((), cpu_target.target_context) as got:
+        assert got is found
+    assert turns._Patience.left == (found is not None)
 
 
 def test_a_vector_is_refused(package):
