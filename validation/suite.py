@@ -117,17 +117,30 @@ def _sections(chosen: Sequence[Section], job: Job) -> tuple[dict[str, dict[str, 
     gates: list[Gate] = []
     with steps(sum(module.steps(job) for module in modules.values())) as step:
         for name, module in modules.items():
-            began = time.perf_counter()
-            record, found = module.run(replace(job, step=step))
-            record |= {"seconds": time.perf_counter() - began}
-            # Checked here, because the end of the run could not name the section at fault.
-            try:
-                json.dumps(record, allow_nan=False)
-            except (TypeError, ValueError) as error:
-                raise RuntimeError(f"{name}: its record cannot be stored as JSON: {error}") from error
-            records[name] = record
+            records[name], found = _section(name, module, replace(job, step=step))
             gates += [replace(gate, section=name) for gate in found]
     return records, gates
+
+
+def _section(name: str, module: Any, job: Job) -> tuple[dict[str, Any], list[Gate]]:
+    """Run a section. Its steps and its record are checked here, because later nothing could name it."""
+    taken: list[str] = []
+
+    def step(what: str) -> None:
+        taken.append(what)
+        job.step(what)
+
+    began = time.perf_counter()
+    record, gates = module.run(replace(job, step=step))
+    record |= {"seconds": time.perf_counter() - began}
+    # Of a user's files the report counts for more than its bar.
+    if job.own and len(taken) != module.steps(job):
+        raise RuntimeError(f"{name}: expected {module.steps(job)} steps, got {len(taken)}")
+    try:
+        json.dumps(record, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise RuntimeError(f"{name}: its record cannot be stored as JSON: {error}") from error
+    return record, gates
 
 
 def _outcome(records: dict[str, dict[str, Any]], gates: list[dict[str, Any]], output: Path) -> dict[str, Any]:

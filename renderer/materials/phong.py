@@ -141,7 +141,7 @@ class Phong(BaseMaterial):
     ) -> None: ...
 
     def _appearance(self) -> Appearance:
-        """What pictures make of it: without highlights, and without a diffuse colour too, of a simpler kind."""
+        """The material as pictures treat it: of a simpler kind if it has no highlights, or no diffuse colour either."""
         return Appearance(
             kind=PHONG if any(self.specular) else LAMBERT if any(self.diffuse) else UNLIT,
             ambient=self.diffuse if self.ambient is None else self.ambient,

@@ -1,4 +1,4 @@
-"""Which material each face of a mesh has: rows of a tuple of materials, -1 for none."""
+"""The material of each face of a mesh: rows of a tuple of materials, -1 for none."""
 
 from __future__ import annotations
 

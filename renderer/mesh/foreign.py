@@ -11,7 +11,7 @@ _SAME_NORMAL = 1e-12
 
 
 class TriangleMesh(Protocol):
-    """What has vertices (V, 3) and faces (F, 3), such as a ``trimesh.Trimesh``."""
+    """An object with vertices (V, 3) and faces (F, 3), such as a ``trimesh.Trimesh``."""
 
     @property
     def vertices(self) -> Any:

@@ -48,7 +48,7 @@ _LEFT_OUT = ("animations", "cameras")
 
 
 class _Shown(NamedTuple):
-    """What a node shows: the meshes of primitives, and where each of them stands.
+    """A node's meshes, one for each primitive, and their placements.
 
     name      of the node, or else of its mesh
     of_mesh   the name of the mesh

@@ -1,4 +1,4 @@
-"""What a mesh file says about the look of faces. ``renderer.scene.material`` has the materials that are drawn."""
+"""The look of faces, as mesh files describe it. ``renderer.scene.material`` has the materials that are drawn."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ class RepairWarning(UserWarning):
 
 @dataclass(frozen=True, eq=False)
 class Repairs:
-    """What ``Mesh.repaired`` left out or replaced; true where there is anything.
+    """Counts of the parts that ``Mesh.repaired`` left out or replaced; true if any is above 0.
 
     Attributes
     ----------

@@ -43,7 +43,7 @@ class _Entry:
 
 
 def rest_of(line: str) -> str:
-    """What stands behind the keyword of a line, without a comment. Names may have blanks, and # within words."""
+    """The rest of a line behind its keyword, without a comment. Names may have blanks, and # within words."""
     words = re.split(r"(?:^|\s)#", line)[0].split(None, 1)
     return " ".join(words[1].split()) if len(words) > 1 else ""
 

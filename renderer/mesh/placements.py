@@ -1,4 +1,4 @@
-"""Where meshes of a file stand: the matrices of a glTF document's nodes, of their instances and of joints of skins."""
+"""Placements of the meshes of a glTF document: the matrices of its nodes, of their instances and of joints of skins."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Nodes:
                 yield number, self._nodes[number]
 
     def matrices(self, number: int) -> list[Floats]:
-        """Where the mesh of a node is: a matrix for each instance."""
+        """The matrices of the mesh of a node, one for each instance."""
         instances = (self._nodes[number].get("extensions") or {}).get(_INSTANCING)
         if not instances:
             return [self._world[number]]

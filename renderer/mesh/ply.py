@@ -392,7 +392,7 @@ def _colors(vertex: _Columns, reading: Reading) -> Float64Array | None:
 
 
 def _full(type_: np.dtype[Any], values: Float64Array) -> float:
-    """What stands for 1: 255 for signed integers, and for unsigned ones of 32 bits and more where none is larger."""
+    """The integer for 1: 255 for signed integers, and for unsigned ones of 32 bits and more where none is larger."""
     if type_.kind == "f":
         return 1.0
     few = type_.kind == "i" or (type_.itemsize > 2 and values.max(initial=0.0) <= 255.0)

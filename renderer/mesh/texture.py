@@ -1,4 +1,4 @@
-"""How a material uses an image: which part of it, what is beyond its edges, and between its pixels."""
+"""The use of an image by a material: its part, wrapping beyond its edges, filtering between its pixels."""
 
 from __future__ import annotations
 

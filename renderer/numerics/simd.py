@@ -146,7 +146,7 @@ def address(typingctx, array):
 
 @intrinsic
 def doubles_between(typingctx, first, second):
-    """How many float64 the ``pointer`` ``second`` is after ``first``."""
+    """The distance from the ``pointer`` ``first`` to ``second``, in float64 numbers."""
 
     def codegen(context, builder, sig, args):
         word = context.get_value_type(types.int64)

@@ -22,7 +22,7 @@ from renderer.trace.spawn import BOUNDED
 
 @dataclass(frozen=True, eq=False)
 class Matte:
-    """What the camera rays of a picture hit.
+    """The hits of a picture's camera rays.
 
     hits        the sum of the weights of a pixel's samples that hit a surface, (h, w) float64: their number, but for
                 filters that are negative somewhere, and clipped to that of all samples

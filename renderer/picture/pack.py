@@ -51,7 +51,7 @@ def pack(scene: Scene, needs: Features | None = None) -> tuple[Mesh, SceneArrays
 
 
 def without_faces(scene: Scene, needs: Features) -> SceneArrays:
-    """What the kernel reads beside the faces, with a row of ``material`` and ``smooth`` for each instance."""
+    """The kernel's arrays other than the faces, with a row of ``material`` and ``smooth`` for each instance."""
     rows = _material_rows(scene)
     return SceneArrays(
         vertices=np.zeros((0, 3)),

@@ -68,7 +68,7 @@ def _stands(scene: Scene) -> Iterator[tuple[Mesh, list[NDArray[np.float64]]]]:
 
 
 def placed_arrays(scene: Scene, needs: Features, built: BuiltScene) -> SceneArrays:
-    """What the kernel reads beside ``built``, with the addresses of smooth meshes' normals, which ``scene`` keeps."""
+    """The kernel's arrays other than ``built``, with the addresses of smooth meshes' normals, which ``scene`` keeps."""
     smooth = [i.smooth and needs.smooth_normals for i in scene.instances]
     own = [_normals(i).ctypes.data if is_smooth else 0 for i, is_smooth in zip(scene.instances, smooth, strict=True)]
     arrays = without_faces(scene, needs)._replace(normals=np.array(own, np.int64), placed=built.top.descriptor)

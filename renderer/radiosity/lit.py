@@ -191,7 +191,7 @@ def _groups(parts: list[_Part]) -> Ints:
 
 
 def _own(parts: list[_Part], groups: Ints) -> tuple[Floats, Floats]:
-    """What surfaces emit, and the share that they return, (n, 3) each."""
+    """The emission and the reflectance of surfaces, (n, 3) each."""
     emission, diffuse = np.zeros((2, int(groups[-1]) + 1, 3))
     first = 0
     for part in parts:

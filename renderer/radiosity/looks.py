@@ -1,4 +1,4 @@
-"""What radiosity makes of the materials of a scene: what faces return and emit, and what it cannot show."""
+"""The reflectance and emission of faces, from the materials of a scene; and what radiosity leaves out."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def check_reflectance(scene: Scene) -> None:
 
 
 def left_out(scene: Scene) -> list[str]:
-    """What of a scene radiosity does not compute, in words that name the key."""
+    """The parts of a scene that radiosity does not compute, in words that name the key."""
     found = []
     for name in sorted({instance.material for instance in scene.instances}):
         found += [f"materials.{name}: {what}" for what in _left_out_of(scene.materials[name])]

@@ -29,7 +29,7 @@ Ints = NDArray[np.int64]
 
 
 class Shot(NamedTuple):
-    """What one surface has sent.
+    """The light that one surface has sent.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Shot(NamedTuple):
 
 
 class _Row(NamedTuple):
-    """Where the power of a surface goes: to some surfaces (k,), each its share (k,)."""
+    """The receivers (k,) of a surface's power, and the share of each (k,)."""
 
     surfaces: Ints
     shares: Floats

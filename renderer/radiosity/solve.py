@@ -52,7 +52,7 @@ class Balance(NamedTuple):
 
     @property
     def error(self) -> Floats:
-        """What enters and does not leave, (3,): 0 but for the residual and rounding.
+        """Power that enters minus power that leaves, (3,): 0 but for the residual and rounding.
 
         Examples
         --------
@@ -68,7 +68,7 @@ class Balance(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Radiosity:
-    """What n surfaces send and receive.
+    """The light that n surfaces send and receive.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What surfaces send and return, as columns of channels: checked arguments."""
+"""Checked arguments: the emission and reflectance of surfaces, as columns of channels."""
 
 from __future__ import annotations
 

@@ -135,7 +135,7 @@ class Members:
         return iter(self.listed)
 
     def rows(self, member: Member) -> slice:
-        """Where a member's instances are among all."""
+        """The rows of a member's instances among all."""
         begin = self._begins[member.id]
         return slice(begin, begin + member.count)
 
@@ -208,9 +208,7 @@ def _top(
 
 
 class Located(NamedTuple):
-    """Where faces of a scene are, with places on them: objects, which instances of those, which faces of their meshes,
-    and barycentrics on these.
-    """
+    """Places on faces of a scene: objects, their instances, the faces of their meshes, and barycentrics on these."""
 
     object: NDArray[np.int64]
     instance: NDArray[np.int64]
@@ -244,7 +242,7 @@ class BuiltScene:
 
     @property
     def tree(self) -> Any:
-        """What queries take for the tree."""
+        """The tree, as queries take it."""
         return self.top
 
     def tree_for(self, rays: RayBatch, faces: str) -> Any:
@@ -272,7 +270,7 @@ class BuiltScene:
 
     @property
     def mesh(self) -> Any:
-        """What queries take for the mesh."""
+        """The mesh, as queries take it."""
         return self
 
     @property
@@ -331,7 +329,7 @@ class BuiltScene:
         return matrices_of(member, self.top.instances[self.members.rows(member)])
 
     def located(self, faces: NDArray[np.int64], u: NDArray[np.float64], v: NDArray[np.float64]) -> Located:
-        """Where faces of the scene (...) and places on them are; -1 for -1."""
+        """The ``Located`` faces of the scene (...) with places on them; -1 for -1."""
         flat, weights = np.ascontiguousarray(faces).reshape(-1), np.stack([u.reshape(-1), v.reshape(-1)])
         located, swapped = np.empty((3, len(flat)), np.int64), np.empty((2, len(flat)))
         words = self.top.instances.view(np.int64)

@@ -53,7 +53,7 @@ class _Places(PlacesOnFaces):
 
     @property
     def instance(self) -> NDArray[np.int64]:
-        """Which of the object's instances, (...) int64; -1 on a miss.
+        """The instance of the object, (...) int64; -1 on a miss.
 
         Examples
         --------
@@ -216,7 +216,7 @@ def _by_object(values: Values, meshes: dict[int, Mesh]) -> dict[int, Any]:
 
 
 class ScenePassage(NamedTuple):
-    """Where rays have gone through faces of a scene: ``SceneHits.through`` makes it, ``leaving`` takes it.
+    """Rays that have passed through faces of a scene: ``SceneHits.through`` makes it, ``leaving`` takes it.
 
     Attributes
     ----------
@@ -310,7 +310,7 @@ class SceneHits(_Places):
 
     @property
     def moment(self) -> str:
-        """Which scene was hit: another name after each change.
+        """The state of the scene that was hit: another name after each change.
 
         Examples
         --------

@@ -42,7 +42,7 @@ class Records:
             self.compact()
 
     def rows(self, object: int) -> slice:
-        """Where the records of an object are in ``array``, until the next removal or ``compact``."""
+        """The rows of an object's records in ``array``, until the next removal or ``compact``."""
         return self._rows[object]
 
     @property

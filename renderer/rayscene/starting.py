@@ -65,7 +65,7 @@ def _rows(rays: RayBatch) -> NDArray[np.float64]:
 
 
 def _on_faces(scene: BuiltScene, leaving: Leaving) -> Hits | Passage | None:
-    """What rays leave, as faces of the scene."""
+    """The faces of the scene that rays leave."""
     if leaving is None:
         return None
     known = isinstance(leaving, SceneHits | ScenePassage)

@@ -1,4 +1,4 @@
-"""Where instances stand: transforms, checked and written to their records."""
+"""Transforms of instances, checked and written to their records."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a mesh knows at places on its faces: values of its vertices and faces, colours, texture coordinates, parts."""
+"""Attributes at places on a mesh's faces: values of vertices and faces, colours, texture coordinates, parts."""
 
 from __future__ import annotations
 

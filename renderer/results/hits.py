@@ -17,7 +17,7 @@ _ROWS = 1 << 14
 
 
 class Passage(NamedTuple):
-    """Where rays have gone through faces: ``Hits.through`` makes it, ``leaving`` takes it.
+    """Rays that have passed through faces: ``Hits.through`` makes it, ``leaving`` takes it.
 
     Attributes
     ----------

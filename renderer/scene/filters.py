@@ -96,7 +96,7 @@ def _along_axis(name: str, count: int) -> tuple[NDArray[np.float64], NDArray[np.
 
 
 def _inverse(one: _Filter, integral: float, low: float, high: float) -> float:
-    """Where between ``low`` and ``high`` the filter has this integral."""
+    """The place between ``low`` and ``high`` up to which the filter has this integral."""
     rises = one.integral(high) > one.integral(low)
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)

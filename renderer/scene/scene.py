@@ -81,7 +81,7 @@ def _twice(value: Any) -> Any:
 
 
 class RenderSettings(Fields):
-    """How a scene is rendered; each setting can also be an argument of ``render``.
+    """Settings of rendering; each can also be an argument of ``render``.
 
     Parameters
     ----------

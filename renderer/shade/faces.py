@@ -1,4 +1,4 @@
-"""How shading reads the faces of a picture: those of one mesh, or of meshes that stand in its scene many times."""
+"""Reading the faces of a picture: those of one mesh, or of meshes with many instances."""
 
 import math
 from typing import Any, NamedTuple
@@ -110,7 +110,7 @@ def _placed_normals(scene, at):
 
 @inlined
 def _own_rows(values, at):
-    """Where the values of a placed mesh's vertices are; the places of all stand before them."""
+    """The row from which a placed mesh's vertices have their values; the places of all come before them."""
     return offset(values, np.int64(load(values, (at >> _FACE_BITS) - 1)))
 
 

@@ -1,4 +1,4 @@
-"""What textures and colours of vertices make of a material at a point: a row of its own.
+"""A material's row at a point, from its textures and from colours of vertices.
 
 Other pictures have kernels without any of this, chosen when they are compiled.
 """

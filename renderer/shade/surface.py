@@ -166,7 +166,7 @@ def scene_pointers(scene):
 
 
 class Look(NamedTuple):
-    """What a ray sees at a hit: the point p, the ``Facet``, the shading normal, and the start of the material's row."""
+    """The surface at a hit: the point p, the ``Facet``, the shading normal, and the start of the material's row."""
 
     p: tuple
     facet: Facet

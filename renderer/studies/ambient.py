@@ -1,4 +1,4 @@
-"""How open points lie: to the light that comes from everywhere, and to all sides."""
+"""Ambient occlusion and openness of points."""
 
 from __future__ import annotations
 

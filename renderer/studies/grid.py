@@ -126,7 +126,7 @@ def _above(mesh: Mesh, axis: int) -> float:
 
 
 def _dropped(octree: Queries, starts: Floats, axis: int) -> FacePoints:
-    """Where rays from above first hit, without those that hit nothing."""
+    """The first hits of rays from above, without misses."""
     hits = octree.closest_hit(starts, 0.0 - np.eye(3)[axis])
     seen = np.flatnonzero(hits.hit)
     points, normals = starts[seen], hits.normals[seen]

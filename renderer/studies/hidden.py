@@ -1,4 +1,4 @@
-"""Which directions are hidden from points: by the mesh, or by the points' own horizons."""
+"""Directions that are hidden from points: by the mesh, or by the points' own horizons."""
 
 from __future__ import annotations
 

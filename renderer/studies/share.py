@@ -1,4 +1,4 @@
-"""What all studies share: checked arguments, tiles on threads, and results."""
+"""Shared by all studies: checked arguments, tiles on threads, and results."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Panes(NamedTuple):
 
 
 class StudyRequest(NamedTuple):
-    """What a study searches, its points (n, 3), their shape as given, how it runs, and what rays are traced through."""
+    """A study's scene, its points (n, 3), their shape as given, its threads and progress, and its transmittances."""
 
     octree: Queries
     places: Places
@@ -76,7 +76,7 @@ class Snapshot(SceneQueries):
 
 
 def snapshot_of(octree: Queries | RayScene) -> Queries | Snapshot:
-    """What traces the rays of a study. Raises ``ValueError`` for what takes no queries."""
+    """The object that traces the rays of a study. Raises ``ValueError`` for one that takes no queries."""
     good = isinstance(octree, Queries | RayScene)
     expect(good, "octree", "an Octree, a BruteForce or a RayScene", type(octree).__name__)
     return Snapshot(octree) if isinstance(octree, RayScene) else octree

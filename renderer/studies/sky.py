@@ -1,4 +1,4 @@
-"""How much of the sky points see, and for how long the sun."""
+"""The share of the sky that points see, and the hours of sun."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ _LEFT, _TABLES, _POINT_INTEGERS = 3 * TILE, 3 * TILE + 1, 3 * TILE + 8
 
 
 class Places(NamedTuple):
-    """Where rays start. ``normals`` has one row for all points, or no row if points have no horizon.
+    """The starts of rays. ``normals`` has one row for all points, or no row if points have no horizon.
 
     points (n, 3), normals (n, 3), (1, 3) or (0, 3) float64, not zero; leaving (n,) int64, -1 for a point that is on no
     face; codes (n,) int64 and anchors (n, 3) float64, as of ``on_surface.SurfacePoints``
@@ -107,7 +107,7 @@ class Sky(NamedTuple):
 
 
 class Answers(NamedTuple):
-    """Where results go; an array without rows is not written.
+    """The arrays of results; one without rows is not written.
 
     sums    (n,) float64: the sum over the hidden or the open directions
     bits    (n, ceil(k / 8)) uint8, zeros at first: a bit for each hidden direction, in the order of ``numpy.packbits``

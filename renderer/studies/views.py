@@ -1,4 +1,4 @@
-"""What is seen from one place: faces by an eye, depths by a camera."""
+"""Views from one place: faces seen by an eye, depths seen by a camera."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _MOST_CUTS = 64
 def visible_faces(
     octree: Queries | RayScene, eye: ArrayLike, *, cuts: int = 1, progress: bool = False
 ) -> NDArray[np.bool_]:
-    """Which faces are seen from an eye: those of which at least one sample point sees the eye.
+    """The faces seen from an eye: those of which at least one sample point sees the eye.
 
     Parameters
     ----------

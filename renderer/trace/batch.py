@@ -84,12 +84,12 @@ class RayBatch(NamedTuple):
 
     @property
     def number(self) -> int:
-        """How many rays there are."""
+        """The number of rays."""
         return count_rays(self.origins, self.directions)
 
 
 def count_rays(origins: NDArray[np.float64], directions: NDArray[np.float64]) -> int:
-    """How many rays there are, by the arrays of a ``RayBatch``."""
+    """The number of rays, by the arrays of a ``RayBatch``."""
     return len(origins) if len(origins) != 1 else len(directions)
 
 

@@ -1,4 +1,4 @@
-"""How kernels read a scene: meshes that stand in it many times, each time placed by a matrix.
+"""Reading a scene in kernels: meshes with many instances, each placed by a matrix.
 
     top's nodes --+-- instance 1 -- nodes of its mesh -- blocks, placed when they are read
                   +-- instance 2 -- nodes of the same mesh ...

@@ -30,7 +30,7 @@ def shapes_of_starts(leaving: ArrayLike | Hits | Passage, side: ArrayLike | None
 def check_leaving(
     leaving: ArrayLike | Hits | Passage, side: ArrayLike | None, shape: tuple[int, ...], most: int
 ) -> Leaving:
-    """What rays of some shape leave, checked; ``most`` is the number of faces of the mesh.
+    """The faces that rays of some shape leave, checked; ``most`` is the number of faces of the mesh.
 
     Raises ``ValueError`` naming the argument and the row.
     """

@@ -1,4 +1,4 @@
-"""What parallel rays see: rays, boxes and faces projected along the rays onto a plane across their dominant axis w.
+"""Parallel rays: rays, boxes and faces projected along the rays onto a plane across their dominant axis w.
 
     y1  +--------.  h1        A point (u, v, w) is seen at x = u - a w and y = v - b w, where (a, b, 1) is along the
         |         '.          direction. A box is seen as a hexagon: the ranges of x, of y, and of h = b u - a v, which

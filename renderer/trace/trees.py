@@ -59,7 +59,7 @@ def _mesh_pointers(descriptor):
 
 
 class Call(NamedTuple):
-    """What a call of Python traces: the tree, the ``RayPointers`` and the ``HitPointers``."""
+    """The records of one call: the tree, the ``RayPointers`` and the ``HitPointers``."""
 
     tree: TreePointers
     rays: RayPointers

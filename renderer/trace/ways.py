@@ -1,4 +1,4 @@
-"""How kernels read what they trace: one mesh's tree, or a scene of placed trees."""
+"""Reading the traced trees in kernels: one mesh's tree, or a scene of placed trees."""
 
 from typing import Any, NamedTuple
 

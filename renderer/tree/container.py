@@ -50,7 +50,7 @@ Arrays = dict[str, NDArray[Any]]
 
 
 class Format(NamedTuple):
-    """What a file of one kind holds.
+    """The contents of a file of one kind.
 
     content  in words, with who wrote it
     keys     of the text beside "arrays"; it may lack the ``optional`` ones

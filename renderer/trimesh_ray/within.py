@@ -1,4 +1,4 @@
-"""Which points lie inside a mesh, as trimesh's ``contains`` asks, the same for each call and batch."""
+"""Points inside a mesh, for trimesh's ``contains``; the same for each call and batch."""
 
 from typing import TYPE_CHECKING
 

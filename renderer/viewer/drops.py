@@ -42,7 +42,7 @@ class Arrived(NamedTuple):
 
 
 class Drops:
-    """What was dropped on the pages of a server. ``paths`` are the scene and mesh files to choose from, by name."""
+    """Files dropped on the pages of a server. ``paths`` are the scene and mesh files to choose from, by name."""
 
     def __init__(self) -> None:
         self.paths: dict[str, Path] = {}

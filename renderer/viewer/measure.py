@@ -33,7 +33,7 @@ class Spot(NamedTuple):
 
     @property
     def error(self) -> float:
-        """How far the point may be from where the exact ray meets the exact plane of its face."""
+        """A bound of the distance from the point to where the exact ray hits the exact plane of its face."""
         return self.t_error * math.hypot(*self.direction)
 
 

@@ -18,7 +18,7 @@ class Part(NamedTuple):
 
     @property
     def label(self) -> str:
-        """What a user knows it by: the name of its mesh, if that has one."""
+        """Its name for users: that of its mesh, if that has one."""
         return FLOOR if self.name == FLOOR else self.instances[0].mesh.name or self.name
 
     @property

@@ -265,7 +265,7 @@ def picture(
 def traced_by(
     shown: ShownScene, view: CameraMessage | Probe, wanted: Pass
 ) -> tuple[PreparedScene, Camera, RenderSettings]:
-    """What ``render`` is given for the view's camera and settings."""
+    """The arguments of ``render`` for the view's camera and settings."""
     prepared = varied(shown.brute if view.mode == "brute" else shown.prepared, view.settings)
     full = wanted.last or wanted.band is not None
     settings = render_settings(shown.scene, view.settings, wanted.size, wanted.samples, full)

@@ -104,6 +104,14 @@ def test_a_failing_gate_is_exit_code_1_and_named_everywhere(
     assert "a closed mesh has no holes" in (tmp_path / "junit.xml").read_text(encoding="utf-8")
 
 
+def test_a_section_that_takes_a_step_too_many_is_named(tmp_path: Path, sections: dict[str, Fake]) -> None:
+    sections["images"].before = lambda job: job.step("a third")
+    with pytest.raises(RuntimeError, match="images: expected 2 steps, got 3"):
+        command.main(["--output", str(tmp_path)])
+    # A user's report does not end for its bar.
+    assert command.main(["--scene", str(SCENE), "--output", str(tmp_path)]) == 0
+
+
 def test_no_gate_is_no_success(tmp_path: Path, sections: dict[str, Fake], capsys: pytest.CaptureFixture[str]) -> None:
     sections["hits"].gates.clear()
     assert command.main(["--only", "hits", "--output", str(tmp_path)]) == 1

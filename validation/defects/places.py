@@ -52,7 +52,7 @@ def find_rule(package: Path, name: str) -> Place:
 
 def rules(package: Path) -> list[str]:
     """The names of all marked rules."""
-    marks = (_MARK.match(line) for path in _files(package) for line in path.read_text(encoding="utf-8").splitlines())
+    marks = (_MARK.match(line) for source in _sources(package).values() for line in source.splitlines())
     return [mark[1] for mark in marks if mark]
 
 
@@ -65,7 +65,7 @@ def find_definition(package: Path, name: str) -> Place:
     places = [
         place
         for path in _files(package, last)
-        if last in _names_in(path.read_text(encoding="utf-8"))[0]
+        if last in _names_in(_sources(package)[path])[0]
         for place in _defined(path, package)
         if f".{place.name}".endswith(f".{name}")
     ]
@@ -79,7 +79,7 @@ def find_name(package: Path, name: str) -> tuple[str, str]:
         module
         for path in _files(package, last)
         if f".{(module := module_of(path, package))}.{last}".endswith(f".{name}")
-        for imported in _names_in(path.read_text(encoding="utf-8"))[1]
+        for imported in _names_in(_sources(package)[path])[1]
         if imported == last
     ]
     try:
@@ -98,7 +98,13 @@ def module_of(path: Path, package: Path) -> str:
 
 def _files(package: Path, text: str = "") -> list[Path]:
     """The sources in which a text stands."""
-    return [path for path in sorted(package.rglob("*.py")) if text in path.read_text(encoding="utf-8")]
+    return [path for path, source in _sources(package).items() if text in source]
+
+
+@cache
+def _sources(package: Path) -> dict[Path, str]:
+    """The text of each source, read once."""
+    return {path: path.read_text(encoding="utf-8") for path in sorted(package.rglob("*.py"))}
 
 
 def _one(places: list[Place], what: str, name: str) -> Place:

@@ -1,4 +1,4 @@
-"""What all cameras share: a place in the world, rays through film positions, and the way back from points.
+"""Shared by all cameras: a place in the world, rays through film positions, and the way back from points.
 
 Film positions (x, y) are in pixels: (0, 0) is the top left corner of the film and (0.5, 0.5) the centre of its first
 pixel.

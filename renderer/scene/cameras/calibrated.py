@@ -1,4 +1,4 @@
-"""What calibrated cameras share: intrinsics in pixels of a stated film, and extrinsics [R|t] in OpenCV's axes."""
+"""Shared by calibrated cameras: intrinsics in pixels of a stated film, and extrinsics [R|t] in OpenCV's axes."""
 
 from __future__ import annotations
 

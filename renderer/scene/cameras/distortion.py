@@ -44,7 +44,7 @@ class Distortion(NamedTuple):
         )
 
     def bent(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
-        """Where places move to."""
+        """The distorted places."""
         square = x * x + y * y
         # rule: distortion
         scale = polynomial((1.0, self.k1, self.k2, self.k3), square) + 2.0 * (self.p1 * y + self.p2 * x)

@@ -1,4 +1,4 @@
-"""Where rays start on a surface, and where they go: points uniform by area, directions by the cosine law.
+"""Rays from a surface: starts uniform by area, directions by the cosine law.
 
 The rays follow a Kronecker sequence in four dimensions, two for the point and two for the direction, eight times with
 shifts of their own: what these eight find differs as much as each errs. Each surface shifts the points and turns the
@@ -35,7 +35,7 @@ COSINE, SINE, TURN = 2, 3, 4
 
 
 class Senders(NamedTuple):
-    """What sends, as the kernel reads it: n rows, each with the members from ``first`` of it to that of the next row.
+    """The senders, as kernels read them: n rows, each with the members from ``first`` of it to that of the next row.
 
     first    (n + 1,) int64
     faces    (m,) int64: the face of each member, -1 for a point on no face

@@ -267,7 +267,7 @@ def _log_integral(p, inner, per_square):
 
 @inlined
 def _end(outer, q):
-    """Where the distance from q is 0."""
+    """The place at which the distance from q is 0."""
     way, square = sub(q, outer.start), outer.length * outer.length
     beside = cross(way, outer.way)
     return _Singular(dot(way, outer.way) / square, math.sqrt(dot(beside, beside)) / square)
@@ -275,7 +275,7 @@ def _end(outer, q):
 
 @inlined
 def _line(outer, inner):
-    """Where the distance from the inner edge's line is 0; too far to matter where nothing is singular.
+    """The place at which the distance from the inner edge's line is 0; too far to matter where nothing is singular.
 
     It is singular only if the foot is on the edge: else both angles change together.
     """

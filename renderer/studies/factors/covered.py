@@ -22,7 +22,7 @@ _GAP = 2.0**-20
 
 
 class Twins(NamedTuple):
-    """What lies on F faces.
+    """The faces that lie on others, of F faces.
 
     twin     (F,) int64: a face that shows its back where the face shows its front, at its middle; -1 for none
     covered  (F,) bool: whether there is one at all places that are looked at, and behind the face a body's inside: an
@@ -38,7 +38,7 @@ _FOUND: WeakKeyDictionary[Queries, tuple[Built, Twins]] = WeakKeyDictionary()
 
 
 def twins_of(octree: Queries) -> Twins:
-    """What lies on the faces of a mesh."""
+    """The ``Twins`` of a mesh."""
     built = octree._built
     last = _FOUND.get(octree)
     if last is None or last[0] is not built:

@@ -84,7 +84,7 @@ def without_matrix(tracing: Tracing) -> ViewFactors:
 
 
 def _targets_of(tracing: Tracing) -> NDArray[np.int32]:
-    """What the rays of all surfaces end on, (n, max_rays)."""
+    """The targets that the rays of all surfaces hit, (n, max_rays)."""
     number, senders = tracing.surfaces.number, tracing.senders
     targets = np.empty((number, tracing.max_rays), np.int32)
     order = order_of(senders, np.arange(number))

@@ -1,4 +1,4 @@
-"""What the rays of many rows hit, row by row until their errors are small enough."""
+"""Rays of many rows, traced until the errors of each row are small enough."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Known(NamedTuple):
 
 
 class RowHits(NamedTuple):
-    """What the rays of n rows hit, as compressed rows; of the targets SKY and BACK follow the surfaces.
+    """The hits of the rays of n rows, as compressed rows; of the targets SKY and BACK follow the surfaces.
 
     first    (n + 1,) int64
     targets  (k,) int64, sorted in each row
@@ -77,7 +77,7 @@ class RowHits(NamedTuple):
 
 
 class Tracing(NamedTuple):
-    """What rows are traced in, and with which aim; see ``view_factors``."""
+    """The scene of the rays, and their aim; see ``view_factors``."""
 
     built: Built
     surfaces: Surfaces
@@ -139,7 +139,7 @@ def _trace_until(
 
 
 def _tally(keys: Integers, rows: Integers, known: Known, rtol: float, last: bool) -> tuple[RowHits, NDArray[np.bool_]]:
-    """What rows hit by their sorted keys, of those that need no more rays; and which of them do."""
+    """The hits of rows by their sorted keys, of those that need no more rays; and which of them do."""
     count, rays = keys.shape
     targets, counts = np.empty((2, count * rays), np.int64)
     errors, lengths = np.empty(count * rays), np.empty(count, np.int64)
@@ -169,7 +169,7 @@ def in_order(parts: list[tuple[Integers, RowHits]]) -> RowHits:
 
 
 def keys_of(tracing: Tracing, rows: Integers, begin: int, count: int) -> Generator[None, None, Integers]:
-    """What the rays from ``begin`` on hit, ``count`` of each row: keys as of ``tally_rows``, (rows, count)."""
+    """The hits of the rays from ``begin`` on, ``count`` of each row: keys as of ``tally_rows``, (rows, count)."""
     keys, surfaces = np.empty((len(rows), count), np.int64), tracing.surfaces
     width = min(count, CHUNK)
     height = max(1, CHUNK // width)

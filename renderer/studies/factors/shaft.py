@@ -142,7 +142,7 @@ def _counted(shaft, count):
 
 @inlined
 def _room(shaft, lever):
-    """How far a face may enter through a plane whose base is so many times shorter than the hull."""
+    """The depth to which a face may enter through a plane whose base is so many times shorter than the hull."""
     return minimum(ROUNDING * shaft.largest * (1.0 + lever), _DEEPEST * shaft.width)
 
 
@@ -160,7 +160,7 @@ def _axis(shaft, a, b):
 
 @kernel
 def _reach(corners, count, way):
-    """How far the first ``count`` corners reach along a direction."""
+    """The largest coordinate of the first ``count`` corners along a direction."""
     most = -np.inf
     for k in range(count):
         most = maximum(most, dot(row3(corners, k), way))
@@ -321,13 +321,13 @@ def _lie_apart(corners, count, face, way, room):
 
 @inlined
 def _room_for(shaft, room, face):
-    """How far a face may enter that is coarser than the polygons."""
+    """The depth to which a face may enter that is coarser than the polygons."""
     return minimum(room * face.coarser, _DEEPEST * shaft.width)
 
 
 @inlined
 def _least(face, way):
-    """How far along a direction the nearest corner of a face is."""
+    """The least coordinate of a face's corners along a direction."""
     return minimum(dot(face.a, way), minimum(dot(face.b, way), dot(face.c, way)))
 
 

@@ -41,7 +41,7 @@ class Surfaces(NamedTuple):
 
     @property
     def number(self) -> int:
-        """How many surfaces there are."""
+        """The number of surfaces."""
         return len(self.areas)
 
     @property

@@ -1,4 +1,4 @@
-"""What the rays of a row hit: each target once, how often, and with which error."""
+"""The targets that the rays of a row hit: each once, with its number of rays and its error."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The checks of scenes: sound scenes pass, and each kind of fault turns a gate red."""
+"""The checks of scenes: each kind of fault turns a gate red."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -57,13 +57,6 @@ def test_hits_are_numbered_as_the_faces_of_the_placed_corners(make: Callable[...
     assert np.abs(volumes).max() < 1e-12
 
 
-@pytest.mark.usefixtures("few")
-def test_sound_scenes_pass_and_embree_differs() -> None:
-    records, gates = scenes.check_scenes(JOB, EFFORT)
-    assert len(records) == 5 and [gate for gate in gates if not gate.passed] == []
-    assert any(family["references"][0]["disagreements"] for record in records for family in record["families"])
-
-
 def _another_instance(hits: SceneHits) -> Any:
     return hits._at._replace(instance=np.where(hits._at.instance == 1, 0, hits._at.instance))
 
@@ -108,9 +101,7 @@ def test_a_gap_between_parts_is_found_and_embree_has_some(monkeypatch: pytest.Mo
 
 
 @pytest.mark.judges("SceneHits.through")
-def test_bodies_of_parts_pass_and_rays_that_start_elsewhere_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    record, gates = scenes.check_parts(JOB)
-    assert gates and all(gate.passed for gate in gates) and sum(row["rays"] for row in record["walks"]) > 100
+def test_rays_that_start_elsewhere_than_on_the_part_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(SceneHits, "through", lambda hits: hits)
     assert red(scenes.check_parts(JOB)) == {"rays that pass other faces than their lines"}
 

@@ -19,13 +19,10 @@ from renderer.trace.layout import BLOCK_FACES
 from validation.gates import Gate
 from validation.hits import check as check_hits
 from validation.hits import leaks as hit_leaks
-from validation.hits import mirrors, scenes, starts, walks
 from validation.hits import section as hits
-from validation.hits.bodies import Body
 from validation.hits.rays import float32_exact
 from validation.job import Job
 from validation.references.table import REFERENCES, HitReference
-from validation.report import page as report
 from validation.thresholds import Thresholds
 
 QUICK = tuple(one for one in REFERENCES if one.key in ("embree_robust", "embree_default", "igl"))
@@ -199,30 +196,3 @@ def test_a_leak_of_any_hit_alone_is_a_leak(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(hit_leaks, "leak_meshes", lambda: {"icosphere": icosphere(2)})
     monkeypatch.setattr(hit_leaks, "Octree", type("Broken", (), {"from_mesh": staticmethod(build)}))
     assert not any(g.passed for g in hits.check_leaks(dataclasses.replace(EFFORT, references=()), job())[1])
-
-
-def test_steps_count_the_suites_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hits, "meshes", lambda: {"ball": ball()})
-    monkeypatch.setattr(hits, "QUICK", EFFORT)
-    for module in (hits, hit_leaks):
-        monkeypatch.setattr(module, "leak_meshes", lambda: {"icosphere": icosphere(2)})
-    for module in (starts, walks):
-        monkeypatch.setattr(module, "bodies", lambda: iter([Body("ball", ball(), True)]))
-    monkeypatch.setattr(mirrors, "BOUNCES", 2)
-    monkeypatch.setattr(scenes, "QUICK", hits.HitEffort(rays=30, exact=6, leaks=0))
-    monkeypatch.setattr(scenes, "_PARTS_QUICK", (1, 4))
-    seen: list[str] = []
-    asked = dataclasses.replace(job(), step=seen.append)
-    record, _ = hits.run(asked)
-    assert len(seen) == hits.steps(asked) > 8
-    page = _page(record)
-    assert "rays of" in page and "icosphere (320 faces)" in page
-
-
-def _page(record: dict[str, Any]) -> str:
-    """The section's partial alone."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    environment = Environment(loader=FileSystemLoader(report._TEMPLATES), autoescape=True, undefined=StrictUndefined)
-    environment.filters["number"] = report.number
-    return environment.get_template("hits.html").render(m={"hits": record}, row={"failed": 0})

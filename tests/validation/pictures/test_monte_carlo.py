@@ -1,4 +1,4 @@
-"""Glass among random paths: the test is calibrated, a sound picture passes, and each defect of the glass does not."""
+"""Glass among random paths: the test is calibrated, and each defect of the glass turns gates red."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from cases import cases
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from renderer.scene.scene import Scene, load_scene
 from validation.gates import Gate
@@ -15,8 +14,6 @@ from validation.pictures import monte_carlo
 from validation.pictures.monte_carlo import scatter_of
 from validation.references.mitsuba import path as mitsuba_path
 from validation.report import page
-from validation.report.figures import monte_carlo_figure
-from validation.report.page import number
 from validation.scenes import SCENES
 
 TEMPLATES = Path(page.__file__).parent / "templates"
@@ -99,24 +96,6 @@ def judged(patch: pytest.MonkeyPatch, ours: Scene) -> tuple[dict[str, Any], list
 
     patch.setattr(monte_carlo, "_picture", other)
     return monte_carlo.run(GLASS, "glass", True)
-
-
-def test_a_sound_picture_passes_and_its_record_is_drawn() -> None:
-    record, gates = monte_carlo.run(GLASS, "glass", True)
-    assert [gate.passed for gate in gates] == [True] * 4
-    assert (
-        record["size"] == 64
-        and record["paths"] == [4, 16, 64]
-        and record["pixels"] == PIXELS
-        and record["left_out"] == []
-    )
-    assert 0.0 < record["fragile_share"] < 0.1
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True
-    )
-    environment.filters["number"] = number
-    page = environment.get_template("monte_carlo.html").render(r=record)
-    assert "1 / sqrt(N)" in monte_carlo_figure(record) and "after" in page.lower() and "Left out" not in page
 
 
 @pytest.mark.judges("Scene.altered")

@@ -1,4 +1,4 @@
-"""Rows 1 to 32, 46 and 49 to 54 of the extreme cases hold, and each judgement fails when what it judges is broken."""
+"""Rows 1 to 32, 46 and 49 to 54 of the extreme cases: each judgement fails when what it judges is broken."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -8,7 +8,6 @@ import pytest
 from cases import cases
 
 from renderer import Hits, Mesh, Octree
-from validation.stability.cases.case import ExtremeCase
 from validation.stability.cases.hits import CASES
 from validation.stability.cases.queries import crowded
 
@@ -18,14 +17,6 @@ Break = Callable[[Hits], Hits]
 
 def test_the_table_has_every_row_once_and_in_order():
     assert [case.number for case in CASES] == [*range(1, 33), 46, 49, 50, 51, 52, 53, 54]
-
-
-@cases("case", CASES)
-def test_the_row_holds(case: ExtremeCase):
-    record = case.record(quick=True)
-    assert record["holds"] is True, record
-    assert record["ours"]
-    assert case.tolerance and case.judges
 
 
 def broken(monkeypatch: pytest.MonkeyPatch, spoil: Break) -> None:
