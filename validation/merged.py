@@ -58,7 +58,7 @@ class Merged:
         return self.merged(self.scene.closest_point(points))
 
     def merged(self, found: Any) -> MergedHits:
-        """What a query of the scene found, by numbers of faces, -1 for none."""
+        """The faces that a query of the scene found, -1 for none."""
         number = self._first[found.object] + found.instance * self._faces[found.object] + found.face
         return MergedHits(found, np.where(found.object >= 0, number, -1))
 

@@ -144,7 +144,7 @@ def _section(name: str, module: Any, job: Job) -> tuple[dict[str, Any], list[Gat
 
 
 def _outcome(records: dict[str, dict[str, Any]], gates: list[dict[str, Any]], output: Path) -> dict[str, Any]:
-    """What follows from records and gates, and what an earlier run stored about defects."""
+    """The parts of the metrics that follow from records, gates and the defects stored by an earlier run."""
     defects = stored_defects(output)
     found = {"gates": gates, "verdict": summary.verdict(gates), "matrix": summary.matrix(records, gates)}
     found["facts"] = summary.facts(records, gates, defects)

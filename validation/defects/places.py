@@ -1,4 +1,4 @@
-"""Where a package's source has a name or a marked rule.
+"""Places of names and of marked rules in a package's sources.
 
 A rule is a statement below a comment ``# rule: short-name``; no two have the same name.
 """

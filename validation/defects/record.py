@@ -1,4 +1,4 @@
-"""What a run of the seeded defects found: a record for JSON, and the gates on it."""
+"""The result of a run of the seeded defects: a record for JSON, and the gates on it."""
 
 from collections import Counter
 from collections.abc import Sequence

@@ -92,7 +92,7 @@ def can_judge(reference: HitReference, mesh: Mesh) -> str | None:
 
 
 class Target(NamedTuple):
-    """What is judged.
+    """The subject of a check.
 
     tracer      has ``closest_hit``, whose hits have t and the face of the mesh, and ``any_hit``
     references  that are compared

@@ -65,7 +65,7 @@ def reflected(tracer: Any, origins: Floats, directions: Floats) -> tuple[int, in
 
 
 def _reflected_once(tracer: Any, origins: Floats, directions: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which rays are not lost, up to the first reflection that loses some, and which stay."""
+    """The rays that are not lost, up to the first reflection that loses some, and those that stay."""
     hits = tracer.closest_hit(origins, directions)
     in_a_row = np.zeros(len(origins), np.int64)
     stays = np.zeros(len(origins), np.bool_)

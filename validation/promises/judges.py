@@ -1,4 +1,4 @@
-"""Who judges each public name: the tests whose marker names it, and the gates of the run."""
+"""The judges of each public name: the tests whose marker names it, and the gates of the run."""
 
 import ast
 from collections import Counter
@@ -55,7 +55,7 @@ def marked(folder: Path) -> dict[str, list[str]]:
 
 
 def _markers(node: ast.Module | ast.ClassDef, place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], list[str]]]:
-    """Where each marker in a module or class stands, and the names that it gives."""
+    """The place of each marker in a module or class, and the names that it gives."""
     for child in node.body:
         if isinstance(child, ast.Assign) and ast.unparse(child.targets[0]) == "pytestmark":
             yield place, _names_in(child.value)

@@ -1,4 +1,4 @@
-"""What ``octree-validate --record`` and ``--compare`` do; they need no reference, only the renderer."""
+"""``octree-validate --record`` and ``--compare``, which need no reference, only the renderer."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""How the hits of a mesh differ from recorded ones."""
+"""Differences of the hits of a mesh from recorded ones."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -49,7 +49,7 @@ class Comparison:
         return not self.differ.any() and self.bounds <= self.tolerance
 
     def summary(self) -> str:
-        """What differs, in one line."""
+        """The differences, in one line."""
         count = len(self.shift)
         if self.passed:
             mesh = "" if self.same_mesh else "the mesh changed, but "

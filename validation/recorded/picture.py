@@ -58,7 +58,7 @@ def _enlarged(picture: Pixels, shape: tuple[int, int]) -> Pixels:
 
 
 def _places(record: Record, found: Comparison) -> NDArray[np.float64]:
-    """Where each ray that differs was hit, or where it is hit now; NaN for the pixels, which show it themselves."""
+    """The hit of each ray that differs, as recorded or else as it is now; NaN for pixels, which show it themselves."""
     t = np.where(found.before.hit, found.before.t, found.now.t)
     t[: len(VIEWS) * record.side**2] = np.nan
     differ = found.differ

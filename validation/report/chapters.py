@@ -54,7 +54,7 @@ def present(metrics: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def absent(metrics: Mapping[str, Any]) -> str:
-    """What the run did not do, with the reasons, in one line; empty where it did everything."""
+    """The parts that the run left out, with the reasons, in one line; empty if none."""
     titles: dict[str, list[str]] = {}
     for part, reason in metrics["left_out"].items():
         titles.setdefault(reason, []).append(PARTIALS[part].title)

@@ -10,7 +10,7 @@ Asked = tuple[int, int]
 
 
 class Check(NamedTuple):
-    """What must hold, and the public names that it judges."""
+    """A law, and the public names that it judges."""
 
     ask: Callable[[], Asked]
     judged: tuple[str, ...]

@@ -111,7 +111,7 @@ def _row(kind: Kind, ours: Ours, queries: dict[str, Query], of: dict[str, Asked]
 
 
 def _beside_one(each: dict[str, list[float]], single: set[str]) -> dict[str, float]:
-    """How many times as fast ours is on one thread as each peer that has one."""
+    """The speed of ours on one thread over that of each peer that has one thread."""
     return {name: ratio(runs, each[OURS_ONE]) for name, runs in each.items() if name in single and OURS_ONE in each}
 
 

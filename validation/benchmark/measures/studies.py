@@ -67,7 +67,7 @@ class Views(NamedTuple):
         return self._replace(points=self.points[:count], normals=self.normals[:count], faces=self.faces[:count])
 
     def above(self, rows: Any) -> NDArray[np.bool_]:
-        """Which directions are above the horizons of the points of some rows."""
+        """The directions above the horizons of the points of some rows."""
         up: NDArray[np.bool_] = self.normals[rows] @ self.directions.T > 0.0
         return up
 
@@ -169,7 +169,7 @@ def measure(form: str, faces: int, count: int, threads: int, step: Callable[[str
 
 
 def _off(faces: int) -> float:
-    """What moves a peer's rays off the surface: a share of the width of a face, of which twelve are a block."""
+    """The distance of a peer's rays from the surface: a share of the width of a face, of which twelve are a block."""
     return _EPSILON * 2.0 / (faces / 12.0) ** 0.5
 
 

@@ -159,7 +159,7 @@ def _chromium() -> str:
 
 @contextmanager
 def _served(scene: Path) -> Iterator[str]:
-    """Where the command serves ``scene``."""
+    """The address at which the command serves ``scene``."""
     command = [sys.executable, "-m", "renderer.cli.main", "view", str(scene), "--port", "0", "--no-browser"]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"})
     assert server.stdout is not None

@@ -1,4 +1,4 @@
-"""What a seeded defect is."""
+"""A seeded defect."""
 
 from dataclasses import dataclass
 from functools import cached_property

@@ -6,7 +6,7 @@ _SIGMA = 5.670374419e-8
 
 
 def heat_of_two(areas: Pair, emissivities: Pair, kelvin: Pair) -> float:
-    """What the first surface loses to the second, in W, if it sees nothing else: a sum of three resistances."""
+    """The power, W, that the first surface loses to the second if it sees nothing else: a sum of three resistances."""
     (a, b), (e, f) = areas, emissivities
     resistance = (1.0 - e) / (a * e) + 1.0 / a + (1.0 - f) / (b * f)
     return _SIGMA * (kelvin[0] ** 4 - kelvin[1] ** 4) / resistance

@@ -34,7 +34,7 @@ def check_batches(sizes: tuple[int, ...] = SIZES) -> list[dict[str, Any]]:
 
 
 def _answers(octree: Octree, number: NDArray[np.int64]) -> dict[str, NDArray[np.bool_]]:
-    """Which rays or points get the right answer, for each query. Every fifth one is beside the grid."""
+    """The rays or points with the right answer, for each query. Every fifth one is beside the grid."""
     beside = number % 5 == 4
     square = number % _SIDE**2
     x, y = square % _SIDE + 0.75 + 2 * _SIDE * beside, square // _SIDE + 0.25

@@ -77,7 +77,7 @@ def _entered(rng: Generator) -> NDArray[np.bool_]:
 
 def _slabs(boxes: NDArray[np.float64], origins: NDArray[np.float64], directions: NDArray[np.float64]
            ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:  # fmt: skip
-    """Which boxes (n, 2, 3) each ray (m, 3) enters, and where that does not hang on rounding, each (n, m)."""
+    """Whether each ray (m, 3) enters each box (n, 2, 3), and whether rounding cannot change that, (n, m) each."""
     ways = np.sort((boxes[:, :, None] - origins) / directions, axis=1)
     first, last = np.maximum(ways[:, 0].max(axis=-1), 0.0), ways[:, 1].min(axis=-1)
     return first <= last, np.abs(first - last) > _CLOSE * (1.0 + np.abs(first) + np.abs(last))

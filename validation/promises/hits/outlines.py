@@ -152,7 +152,7 @@ def _covers(outline: Whole, triangles: Whole, points: Whole) -> bool:
 
 
 def _winding(ring: Whole, points: Whole) -> Whole:
-    """How often a ring (n, 2) winds around each point."""
+    """The winding number of a ring (n, 2) around each point."""
     a, b = ring[:, None], np.roll(ring, -1, axis=0)[:, None]
     side = _turn(a, b, points[None])
     up = (a[..., 1] <= points[:, 1]) & (b[..., 1] > points[:, 1]) & (side > 0)

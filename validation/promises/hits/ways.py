@@ -28,5 +28,5 @@ def ways(octree: Octree, brute: BruteForce, count: int) -> Iterator[tuple[str, O
 def asked(
     ask: Callable[[Octree | BruteForce, Indices], NDArray[np.bool_]], octree: Octree, brute: BruteForce, count: int
 ) -> NDArray[np.bool_]:
-    """Which rays of all ways ``ask(tracer, rows)`` says were answered as promised."""
+    """The rays of all ways whose answers are as promised, by ``ask(tracer, rows)``."""
     return np.concatenate([ask(tracer, rows) for _, tracer, batches in ways(octree, brute, count) for rows in batches])

@@ -61,7 +61,7 @@ def _scene(camera: Camera) -> Scene:
 
 
 def _lines(camera: Camera, width: int, height: int) -> tuple[Floats, Floats]:
-    """Where each pixel's ray starts, and a vector along it."""
+    """The start of each pixel's ray, and a vector along it."""
     if not isinstance(camera, PerspectiveCamera | OrthographicCamera):
         way = lenses.ways(camera, width, height) @ _view(camera)[:3, :3]
         return np.broadcast_to(np.asarray(camera.eye), way.shape), way

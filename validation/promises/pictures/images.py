@@ -143,7 +143,7 @@ def _faces() -> Bools:
 
 
 def _side(mesh: Mesh) -> NDArray[np.int64]:
-    """Which of a column's two triangles each pixel of it shows, as often as there are columns: (10, 40)."""
+    """The one of a column's two triangles that each of its pixels shows, for each column: (10, 40)."""
     x, z = np.meshgrid(-2.0 + (np.arange(10) + 0.5) / 10.0, -0.5 + (np.arange(10) + 0.5) / 10.0)
     (a, _, c), _ = mesh.triangles[:, :, [0, 2]]
     first = mesh.triangles[0, 1, [0, 2]]

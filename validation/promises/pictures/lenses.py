@@ -49,7 +49,7 @@ def lens_of(rng: Generator) -> dict[str, Any]:
 
 
 def bent(lens: dict[str, Any], x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Where a lens shows what a pinhole shows at (x, y)."""
+    """The place at which a lens shows what a pinhole shows at (x, y)."""
     radial, aside, below = _parts(lens, x, y)
     return x * radial + aside, y * radial + below
 

@@ -54,7 +54,7 @@ def _orders(count: int) -> list[tuple[int, ...]]:
 def _kept(
     pile: str, order: tuple[int, ...], height: float = _ABOVE, prepared: float | None = None
 ) -> NDArray[np.bool_]:
-    """Which pixels are right, seen from a height, of a scene prepared for a camera at another, if told."""
+    """The right pixels, seen from a height, of a scene prepared for a camera at another, if that is given."""
     slabs = [(name, 10.0 - i, 4.0 - order.index(i)) for i, name in enumerate(pile)]
     x = _film_x() + _shift(slabs, height)
     stripe = (x + _WIDTH / 2) / _WIDTH * _STRIPES

@@ -93,7 +93,7 @@ def _visits(root: _Octant, origin: Floats, direction: Floats, t_max: float) -> t
 
 
 def _along(octant: _Octant, direction: Floats) -> float:
-    """How far the middle of a box is along the diagonal with the direction's signs."""
+    """The coordinate of a box's middle along the diagonal with the direction's signs."""
     return float(octant.box.mean(axis=0) @ np.sign(direction))
 
 

@@ -42,7 +42,7 @@ def check_projections(rng: Generator, count: int) -> list[dict[str, Any]]:
 
 
 def _fisheye(k: Floats, ahead: Floats) -> tuple[Floats, Floats]:
-    """Where a fish-eye shows points, in focal lengths."""
+    """Points on a fish-eye's film, in focal lengths."""
     x, y = (ahead[:, :2] / ahead[:, 2:]).T
     r = np.sqrt(x**2 + y**2)
     theta = np.arctan(r)

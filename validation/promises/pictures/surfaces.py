@@ -1,4 +1,4 @@
-"""What maps, colours of vertices, masks and emission make of a surface, by closed forms."""
+"""Surfaces with maps, colours of vertices, masks and emission, by closed forms."""
 
 from typing import Any
 

@@ -56,7 +56,7 @@ def close(found: NDArray[np.float32], expected: Any) -> NDArray[np.bool_]:
 
 
 def across(values: Floats, x: Floats, y: Floats) -> Floats:
-    """What the corners of a sheet have, (4, n), linearly on each of its two triangles."""
+    """The values (4, n) of a sheet's corners, interpolated linearly on each of its two triangles."""
     a, b, c, d = values
     x, y = x[..., None], y[..., None]
     return np.where(y < x, a + (b - a) * x + (c - b) * y, a + (d - a) * y + (c - d) * x)

@@ -87,7 +87,7 @@ def _steps(rng: Generator) -> NDArray[np.int64]:
 
 
 def exactly_near(asked: Any, faces: Floats, points: Floats) -> NDArray[np.bool_]:
-    """Which answers have the exact distance, no higher face than the lowest nearest, and a point at that distance."""
+    """The answers with the exact distance, no higher face than the lowest nearest, and a point at that distance."""
     found = asked.closest_point(points)
     squares, lowest = zip(*(_nearest(point, faces) for point in points), strict=True)
     reach, other = (np.abs(faces[list(face)] - points[:, None]).max(axis=(1, 2)) for face in (found.face, lowest))

@@ -1,4 +1,4 @@
-"""What hits of a scene know: places, normals, colours, texture coordinates and values, beside trimesh and Mitsuba."""
+"""Attributes of a scene's hits: places, normals, colours, texture coordinates, values, beside trimesh and Mitsuba."""
 
 from typing import Any
 
@@ -93,7 +93,7 @@ def _bounded(world: _World, found: Any, rays: NDArray[np.int64]) -> Bools:
 
 
 def _judged(world: _World, found: Any, place: Floats) -> dict[str, Bools]:
-    """Which of what was found is near to what trimesh says of the places; nan where nothing was."""
+    """Whether each attribute is near to trimesh's at the place; nan without a hit."""
     number = world.merged.merged(found).face
     hit = number >= 0
     face = world.faces[number[hit]]
@@ -126,7 +126,7 @@ def _judged(world: _World, found: Any, place: Floats) -> dict[str, Bools]:
 
 
 def _beside_mitsuba(world: _World, hits: Any) -> Bools:
-    """Which hits at other than grazing angles have Mitsuba's attributes, of bodies that have some."""
+    """The hits, at other than grazing angles, that have Mitsuba's attributes, of bodies that have some."""
     known = np.nan_to_num(world.colors), np.nan_to_num(world.texcoords)
     theirs = attributes(world.vertices, world.faces, *known, *world.rays)
     directions = world.rays[1]

@@ -1,4 +1,4 @@
-"""What a ray may hit: masks, sides of faces, ignored, hidden and removed instances, of bodies with whole corners."""
+"""Choices of what a ray may hit: masks, sides, ignored, hidden and removed instances, of bodies with whole corners."""
 
 from collections.abc import Iterator
 from fractions import Fraction
@@ -28,7 +28,7 @@ _ALL = 2**32 - 1
 
 
 class _Query(NamedTuple):
-    """What a query asks beside its rays, and which faces (rays, all) may be hit."""
+    """The options of a query beside its rays, and the faces (rays, all) that may be hit."""
 
     options: dict[str, Any]
     allowed: Bools
@@ -126,7 +126,7 @@ class _World:
         self.lines = [contacts(vertices, faces.astype(np.int32), *ray) for ray in zip(*self.rays, strict=True)]
 
     def judged(self, merged: Merged, query: _Query) -> dict[str, Bools]:
-        """Which rays get the right answers to all that a scene, which may lack the first objects, is asked."""
+        """The rays with right answers to all queries of a scene, which may lack the first objects."""
         scene, rays, options = merged.scene, self.rays, query.options
         lacking = int(self.first[min(scene.objects)])
         low, high = options.get("t_min", 0.0), options.get("t_max", np.inf)

@@ -48,7 +48,7 @@ def _body(mesh: Any, size: float, offset: Floats, rng: Generator) -> Body:
 
 
 def _judged(world: Merged, bodies: list[Body], points: Floats) -> dict[str, Bools]:
-    """Which points get the right answer, for each query."""
+    """The points with the right answer, for each query."""
     scene, (vertices, faces) = world.scene, placed(bodies)
     triangles = vertices[faces]
     exactly = [rational(triangle) for triangle in triangles.tolist()]

@@ -43,7 +43,7 @@ def check(name: str, quick: bool) -> dict[str, Any]:
 
 
 def counted(room: Room, rays: int) -> Floats:
-    """How many of each surface's rays end on each surface, and in the last column in the sky."""
+    """The number of each surface's rays that end on each surface, and in the last column in the sky."""
     corners, rng = room.mesh.triangles, np.random.default_rng(_SEED)
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     areas = np.linalg.norm(across, axis=1)

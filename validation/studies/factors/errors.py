@@ -1,4 +1,4 @@
-"""How fast errors of view factors fall with the number of rays, and whether they are as large as is stated."""
+"""Errors of view factors: how fast they fall with the number of rays, and whether they are as large as stated."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -37,7 +37,7 @@ def tasks(quick: bool) -> list[Task]:
 
 
 def record(found: Iterator[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
-    """What the tasks found, in their order."""
+    """The results of the tasks, in their order."""
     return {
         "forms": [next(found) for _ in forms.FORMS],
         "points": [next(found) for _ in points.CHECKS],

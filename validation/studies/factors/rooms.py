@@ -77,7 +77,7 @@ def between(one: Plate, other: Plate) -> float:
 
 
 def _before(span: Span, plane: Plate) -> Span:
-    """How far in front of a plane the points of a span are, without what is behind it."""
+    """The distances of a span's points in front of a plane, without what is behind it."""
     low, high = sorted(max(0.0, (end - plane.at) * plane.sign) for end in span)
     return Span(low, high)
 
