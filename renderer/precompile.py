@@ -104,7 +104,7 @@ def _bound_errors() -> None:
 
 def _find_nearest() -> None:
     for accelerator in (Octree.from_mesh(_TRIANGLE), BruteForce.from_mesh(_TRIANGLE)):
-        # One point is told by float64, the other is not.
+        # float64 decides for one point, not for the other.
         accelerator.closest_point([[0.0, 0.0, 1.0], [0.5, 0.5, 1e-300]])
 
 

@@ -205,8 +205,8 @@ class Queries:
         origins, directions, t_min, t_max, leaving, side
             As for ``closest_hit``.
         contacts : bool, default True
-            Report hits of a ray at one edge or corner once, as the first of them. Edges are told apart by position, so
-            thin walls and double faces stay two hits. If False, each face that is hit is reported.
+            Report hits of a ray at one edge or corner once, as the first of them. Edges with the same end positions
+            are one edge. Thin walls and double faces stay two hits. If False, each face that is hit is reported.
         max_hits : int, optional
             Keep at most this many hits of each ray, the nearest.
         t_error : bool, default False

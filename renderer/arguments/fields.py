@@ -166,7 +166,7 @@ def _in_our_words(message: str) -> str:
 
 
 def _type_message(told: dict[str, Any]) -> str:
-    """The fault of the key by which the members of a union are told apart."""
+    """The fault of the key that distinguishes the members of a union."""
     key, known = told["discriminator"], told.get("expected_tags", "")
     got = f", got {told['tag']!r}" if "tag" in told else ", got none"
     return f"expected {key} to be one of {known}{got}" if known else f"expected the key {key}{got}"

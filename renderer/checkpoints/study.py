@@ -39,7 +39,7 @@ class Study:
         `sky_view_factor`, `sun_hours` or `ambient_occlusion` of ``renderer.studies``.
     options : dict, optional
         Keyword arguments of that function, without points, normals, ``leaving``, ``threads`` and ``progress``. Arrays,
-        such as ``transmittance``, are told apart by their numbers.
+        such as ``transmittance``, are distinguished by their values.
 
     Raises
     ------

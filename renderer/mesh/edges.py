@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 def open_edges(vertices: NDArray[np.float64], faces: NDArray[np.int32], oriented: bool) -> NDArray[np.int64]:
     """(k, 2) vertex numbers of the edges at which a surface is open, one row for each place, in the order of the faces.
 
-    Vertices are told apart by position, so triangle soup is as closed as a shared mesh. With ``oriented`` an edge is
+    Vertices at one position count as one, so triangle soup is as closed as a shared mesh. With ``oriented`` an edge is
     closed where as many faces pass it in one direction as in the other, else where an even number of faces has it.
     """
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
@@ -38,7 +38,7 @@ def sides(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Of each side (f, 3) of each face the places where it starts and ends, and a number that its edge alone has.
 
-    Places and edges are told by position: what lies at one place has one number.
+    Vertices at one position have one number, and so have edges between the same positions.
     """
     place = places(vertices)
     start, end = place[faces], place[np.roll(faces, -1, axis=1)]

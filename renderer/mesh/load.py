@@ -47,8 +47,7 @@ def load_mesh(
     Parameters
     ----------
     path : str, path, bytes or binary file
-        A file whose name ends in its kind, also before ``.gz``; or the content of one, whose kind is told by its first
-        bytes.
+        A file whose name ends in its kind, also before ``.gz``; or its content, whose first bytes say its kind.
     name : str, optional
         The name of the mesh; by default that of the file, without its suffix.
     repair : bool, default False

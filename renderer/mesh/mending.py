@@ -92,7 +92,7 @@ class Twins(NamedTuple):
 
 
 def twins(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Twins:
-    """Faces with the same three corners, told apart by position, from whichever corner and either way round."""
+    """Faces with the same three corner positions, from whichever corner and either way round."""
     return _twins(places(vertices)[faces])
 
 

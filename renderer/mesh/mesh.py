@@ -428,9 +428,9 @@ class Mesh:
     def creased(self, angle: float = 30.0) -> Mesh:
         """Return the mesh with normals that are smooth but for sharp edges.
 
-        Vertices are split at edges where the normals of the faces differ by more than the angle. Edges are told apart
-        by the positions of their ends, so faces that share no vertex, as in an STL file, are smooth too. Faces keep
-        their order and corners.
+        Vertices are split at edges where the normals of the faces differ by more than the angle. Edges with the same
+        end positions are one edge, so faces that share no vertex, as in an STL file, are smooth too. Faces keep their
+        order and corners.
 
         Parameters
         ----------
@@ -521,7 +521,7 @@ class Mesh:
     def without_duplicates(self) -> tuple[Mesh, int]:
         """Return the mesh without faces that are there twice, turned or not, and how many were left out.
 
-        Of faces with the same three corners, told apart by position, the first stays. Vertices stay as they are.
+        Of faces with the same three corner positions, the first stays. Vertices stay as they are.
 
         Returns
         -------
@@ -548,9 +548,9 @@ class Mesh:
     def is_closed(self) -> bool:
         """Return whether the faces bound a volume, so that ``Octree.contains`` takes the mesh.
 
-        The mesh has faces, and each edge is passed as often in one direction as in the other. Edges are told apart by
-        the positions of their ends, so a mesh whose faces share no vertices, as in an STL file, can be closed. Faces
-        that are all there as often one way round as the other bound nothing.
+        The mesh has faces, and each edge is passed as often in one direction as in the other. Edges with the same end
+        positions are one edge, so a mesh whose faces share no vertices, as in an STL file, can be closed. Faces that
+        are all there as often one way round as the other bound nothing.
 
         Returns
         -------
@@ -580,7 +580,7 @@ class Mesh:
     def open_edges(self) -> NDArray[np.int64]:
         """The vertices of each edge that is passed more often in one direction than in the other, (k, 2) int64.
 
-        Edges are told apart by the positions of their ends.
+        Edges with the same end positions are one edge.
 
         Examples
         --------
@@ -596,7 +596,7 @@ class Mesh:
     def odd_edges(self) -> NDArray[np.int64]:
         """The vertices of each edge that an odd number of faces has, (k, 2) int64.
 
-        Edges are told apart by the positions of their ends.
+        Edges with the same end positions are one edge.
 
         Examples
         --------

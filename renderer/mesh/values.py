@@ -39,7 +39,7 @@ def interpolated(
 
 
 def owned_values(mesh: Mesh, values: ArrayLike, on: Owner | None) -> tuple[NDArray[Any], Owner]:
-    """Values of all vertices or all faces, a row each, and of which; told by their number where ``on`` is None.
+    """Values of all vertices or all faces, a row each, and their owners: by the number of rows where ``on`` is None.
 
     Raises ``ValueError`` naming the argument.
     """

@@ -20,7 +20,7 @@ def placed_faces(vertices: Floats, faces: Integers) -> Integers:
 
 
 def distinct_faces(vertices: Floats, faces: Integers, rows: Integers) -> Integers:
-    """Those of the faces in ``rows`` that stand where none before them does. Corners are told apart by position."""
+    """Those of the faces in ``rows`` whose three corner positions no face before them has."""
     again = _repeated(vertices, faces, rows)
     return rows[~again] if again.any() else rows
 
@@ -48,6 +48,6 @@ def _repeated(vertices: Floats, faces: Integers, rows: Integers) -> NDArray[np.b
 
 
 def standing_together(triples: Integers) -> tuple[Integers, Integers]:
-    """A number (f,) for each place where faces stand, told by three numbers in any order, and how many faces it has."""
+    """A number (f,) for each set of three numbers, in any order, and the number of faces with that set."""
     _, place, count = np.unique(np.sort(triples, axis=1), axis=0, return_inverse=True, return_counts=True)
     return place.reshape(-1), count[place.reshape(-1)]

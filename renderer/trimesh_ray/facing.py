@@ -28,7 +28,7 @@ class Rings(NamedTuple):
 
 
 def rings_of(vertices: Floats, faces: NDArray[np.integer[Any]], rows: Integers) -> Rings:
-    """The rings of the faces in ``rows``; vertices are told apart by position."""
+    """The rings of the faces in ``rows``; vertices at one position are one vertex."""
     _, places = np.unique(vertices + 0.0, axis=0, return_inverse=True)
     corners = places.reshape(-1)[faces]
     there = corners[rows]

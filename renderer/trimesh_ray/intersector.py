@@ -216,10 +216,10 @@ class RayMeshIntersector:
 def _asked(
     ask: Callable[[Floats, Floats], Any], origins: ArrayLike, directions: ArrayLike
 ) -> tuple[Any, NDArray[np.bool_] | None]:
-    """The answer for the rays, and which of them can hit anything; None for all.
+    """The answer for the rays, and a mask of those that can hit anything; None for all.
 
-    That is told only where some ray is refused: most calls have none that is not finite or has no direction. In place
-    of these any other rays are asked.
+    The mask is made only if ``ask`` refuses a ray, because most calls have none that is not finite or has no direction.
+    Any other ray then takes the place of such a one.
     """
     o, d = as_rows("ray_origins", origins), as_rows("ray_directions", directions)
     expect(d.shape == o.shape, "ray_directions", f"the shape of ray_origins, {o.shape}", f"shape {d.shape}")

@@ -43,7 +43,7 @@ def solid_faces(vertices: Floats, faces: NDArray[np.integer[Any]], rows: Integer
 def _edges(vertices: Floats, faces: NDArray[np.integer[Any]]) -> tuple[Integers, Flags]:
     """The number (f, 3) of each side's edge, and whether the side bounds anything: from a place to itself none does.
 
-    Edges are told apart by the places of their ends.
+    Edges with the same end positions are one edge.
     """
     start, end, keys = sides(vertices, faces)
     return np.unique(keys, return_inverse=True)[1].reshape(faces.shape).astype(np.int64), start != end

@@ -38,7 +38,7 @@ def points_within(it: "Traced", points: Floats) -> NDArray[np.bool_]:
 
 
 def _by_votes(octree: "Octree", points: Floats) -> NDArray[np.bool_]:
-    """Parity by two opposite rays, as trimesh counts: where they differ, and both hit, another two are asked."""
+    """Parity by two opposite rays, as trimesh counts: where they differ, and both hit, by another two."""
     inside = octree.closest_point(points).distance == 0.0
     left = np.flatnonzero(~inside)
     for direction in _VOTES:

@@ -223,7 +223,7 @@ def judge(body: Body, surface: Surface, batch: Batch, exact: int, rng: Generator
 
 
 def judged_at_once(surface: Surface, batch: Batch) -> tuple[Bools, Bools]:
-    """Two masks: rays stopped or not stopped at t = 0 against the law, or by another face; and rays that should go on."""
+    """Masks of rays stopped, or not, at t = 0 against the law, or by another face; and of rays that should go on."""
     wrong, goes_on = np.zeros((2, len(batch.t)), np.bool_)
     order = np.argsort(batch.which, kind="stable")
     ends = np.searchsorted(batch.which[order], np.arange(len(batch.starts) + 1))
