@@ -1,11 +1,11 @@
 """Arguments that stand for arrays, such as lists or columns of tables, as NumPy arrays of real numbers."""
 
+import sys
 from collections.abc import Iterator
 from numbers import Real
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.ma import MaskedArray, getmaskarray
 from numpy.typing import NDArray
 
 from renderer.errors import expect
@@ -77,8 +77,9 @@ def plain_array(values: Any) -> NDArray[Any]:
 
     Raises ``ValueError`` for ragged lists, masked values and memory that NumPy cannot reach.
     """
-    if isinstance(values, MaskedArray):
-        masked = int(getmaskarray(values).sum())
+    # Who has a masked array has its module, which takes a while to import.
+    if "numpy.ma" in sys.modules and isinstance(values, np.ma.MaskedArray):
+        masked = int(np.ma.getmaskarray(values).sum())
         if masked:
             raise ValueError(f"expected no masked values, got {masked}")
         return np.asarray(values.data)

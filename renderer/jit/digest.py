@@ -1,6 +1,7 @@
 """Digests of kernel sources, in the names of compiled kernels: an edit of an imported file changes the digest."""
 
 import hashlib
+import os
 import re
 from collections.abc import Iterable
 from functools import cache
@@ -65,10 +66,23 @@ def _source(path: Path) -> bytes:
 @cache
 def imported_files(path: Path) -> list[Path]:
     """The files of the package that a source imports by ``from renderer.a.b import c``; c: a module or a name in b."""
-    found = []
+    found, modules = [], _modules()
     for module, names in _IMPORT.findall(_source(path).decode(errors="replace")):
-        base = PACKAGE.joinpath(*module.split(".")[1:])
-        below = [base / f"{name}.py" for name in re.findall(r"\w+", names)]
-        candidates = [base.with_suffix(".py"), base / "__init__.py", *below]
-        found += [file for file in candidates if file != PACKAGE.with_suffix(".py") and file.exists()]
+        for name in (module, *(f"{module}.{below}" for below in re.findall(r"\w+", names))):
+            found += [Path(file) for file in modules.get(name, ())]
     return found
+
+
+@cache
+def _modules() -> dict[str, list[str]]:
+    """The files of the package by the names of their modules; a module and a folder may have the same name."""
+    modules: dict[str, list[str]] = {}
+    for folder, below, files in os.walk(PACKAGE):
+        # It has many files, and no source.
+        below[:] = [name for name in below if name != "__pycache__"]
+        parent = PACKAGE.name + folder[len(str(PACKAGE)) :].replace(os.sep, ".")
+        for file in files:
+            if file.endswith(".py"):
+                name = parent if file == "__init__.py" else f"{parent}.{file[:-3]}"
+                modules.setdefault(name, []).append(os.path.join(folder, file))
+    return modules

@@ -21,6 +21,9 @@ from validation.scenes import SCENES
 
 _RUNS = 3
 _HERE = "validation.benchmark.measures.first_answers"
+_FIRST_HIT = "validation.benchmark.measures.first_hit:first_hit"
+# Python keeps bytecode of the sources, as after an installation.
+_WITH_BYTECODE = {"PYTHONDONTWRITEBYTECODE": ""}
 # Sizes of the mesh: float32 does not hold its vertices times a third, and holds them as they are.
 _FLOAT64, _FLOAT32 = "0.3333333333333333", "1.0"
 
@@ -62,8 +65,7 @@ def _one_round(cache: Path, ahead: Path) -> dict[str, float]:
     """Each first result once, with an empty cache for the cold ones."""
     render = [sys.executable, "-P", "-m", "renderer", "render", str(SCENES / "three_models.toml"), "-o",
               f"{cache}.png", "--resolution", "512x512", "--quiet"]  # fmt: skip
-    hit = child.command(f"{_HERE}:first_hit", _FLOAT64)
-    single = child.command(f"{_HERE}:first_hit", _FLOAT32)
+    hit, single = child.command(_FIRST_HIT, _FLOAT64), child.command(_FIRST_HIT, _FLOAT32)
     cold = _spend(hit, NUMBA_CACHE_DIR=f"{cache}/hit")
     again, other = _spend(hit, NUMBA_CACHE_DIR=f"{cache}/hit"), _spend(single, NUMBA_CACHE_DIR=f"{cache}/hit")
     picture = _spend(render, NUMBA_CACHE_DIR=f"{cache}/picture")
@@ -84,7 +86,7 @@ def _spend(command: list[str], **more: str) -> Spent:
     import resource  # POSIX only, as ``measure`` asks
 
     before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    environment = child.environment(OCTREE_RENDERER_QUIET="1", **more)
+    environment = child.environment(OCTREE_RENDERER_QUIET="1", **_WITH_BYTECODE, **more)
     subprocess.run(command, env=environment, capture_output=True, check=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     wall = time.perf_counter() - began
@@ -102,19 +104,6 @@ def _kernels_ahead(folder: Path) -> tuple[str, Path]:
     command = [sys.executable, "-P", "-m", "renderer", "compile", "--level", level, "-o", str(ahead), "--quiet"]
     subprocess.run(command, env=child.environment(), capture_output=True, check=True)
     return level, ahead
-
-
-def first_hit(size: str) -> None:
-    """In its own process: build an octree over a small mesh of this size and trace three rays."""
-    import numpy as np
-
-    from renderer import Octree
-    from renderer.mesh.shapes import icosphere
-
-    ball = icosphere(3)
-    octree = Octree(ball.vertices.astype(np.float32).astype(np.float64) * float(size), ball.faces)
-    origins, directions = np.eye(3) * 3.0, -np.eye(3)
-    assert octree.closest_hit(origins, directions).hit.all()
 
 
 def _level_speed(folder: Path, ahead: Path) -> dict[str, list[float]]:
