@@ -186,8 +186,11 @@ def _with_touching(
     threads: int,
     clock: Stopwatch,
 ) -> PreparedScene:
-    tree = built.top if isinstance(built, BuiltScene) else tree_for(built, needs)
-    arrays = find_touching(tree, arrays, needs, threads)
+    tree = searched = built.top if isinstance(built, BuiltScene) else tree_for(built, needs)
+    if isinstance(built, BruteForce) and needs.refraction:
+        # All faces against all others would take longer than the picture.
+        searched = tree_for(Octree.from_mesh(built.mesh, threads=threads), needs)
+    arrays = find_touching(searched, arrays, needs, threads)
     return PreparedScene(scene, built, needs, arrays, tree, clock.seconds())
 
 

@@ -6,7 +6,7 @@ import threading
 import numpy as np
 import pytest
 from cases import cases
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from meshes import KINDS, assert_same_hits, make_mesh, rays_at
 
@@ -117,6 +117,7 @@ def test_a_scene_has_the_bits_of_its_merged_mesh(seed):
     assert_like_merged(make_scene(seed), seed)
 
 
+@settings(max_examples=30)  # each is compared four times
 @given(st.integers(0, 2**20))
 def test_it_has_them_after_every_change(seed):
     rng, scene = np.random.default_rng(seed), make_scene(seed)

@@ -61,11 +61,12 @@ def find_definition(package: Path, name: str) -> Place:
 
     Raises ``ValueError`` where there is none, or more than one.
     """
-    last = name.rpartition(".")[2]
     places = [
         place
-        for path in _files(package, last)
-        if last in _names_in(_sources(package)[path])[0]
+        for path in _files(package, name.rpartition(".")[2])
+        if any(
+            f".{module_of(path, package)}{own}".endswith(f".{name}") for own in _names_in(_sources(package)[path])[0]
+        )
         for place in _defined(path, package)
         if f".{place.name}".endswith(f".{name}")
     ]
@@ -148,11 +149,11 @@ def _named(body: list[ast.stmt], prefix: str) -> Iterator[tuple[str, ast.stmt]]:
 
 @cache
 def _names_in(text: str) -> tuple[frozenset[str], list[str]]:
-    """The last parts of the names that a source defines, and the names that its top imports from elsewhere."""
+    """The names that a source defines, each after a dot, and the names that its top imports from elsewhere."""
     body = ast.parse(text).body
     imports = [node for node in body if isinstance(node, ast.ImportFrom)]
     return (
-        frozenset(name.rpartition(".")[2] for name, _ in _named(body, "")),
+        frozenset(name for name, _ in _named(body, "")),
         [name for node in imports for name in _bound(node)],
     )
 
