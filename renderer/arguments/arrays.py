@@ -77,8 +77,9 @@ def plain_array(values: Any) -> NDArray[Any]:
 
     Raises ``ValueError`` for ragged lists, masked values and memory that NumPy cannot reach.
     """
-    # Who has a masked array has its module, which takes a while to import.
-    if "numpy.ma" in sys.modules and isinstance(values, np.ma.MaskedArray):
+    # Whoever has a masked array has imported its module, which takes a while.
+    masked_array: Any = getattr(sys.modules.get("numpy.ma"), "MaskedArray", ())
+    if isinstance(values, masked_array):
         masked = int(np.ma.getmaskarray(values).sum())
         if masked:
             raise ValueError(f"expected no masked values, got {masked}")
