@@ -14,6 +14,7 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from statistics import median
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
@@ -153,6 +154,12 @@ def drop_in(run: Record) -> str:
     return table(("call", "faces", *(f"{n:,}" for n in counts)), rows)
 
 
+def threads(run: Record) -> str:
+    """How many times as much two threads do as one, over all kinds of queries."""
+    of = [row["mrays"]["ours"] / row["mrays"]["ours_one_thread"] for row in run["queries"]]
+    return f"{median(of):.2f}"
+
+
 def frames(run: Record) -> str:
     of = run["frames"]
     rows = [(name, f"{of['seconds'][key]:.3f}") for key, name in PICTURES.items() if key in of["seconds"]]
@@ -161,7 +168,7 @@ def frames(run: Record) -> str:
 
 BLOCKS: dict[str, Callable[[Record], str]] = {
     "runs": runs, "errors": errors, "peers": peers, "rays": rays, "cells": cells, "points": points, "builds": builds,
-    "drop_in": drop_in, "frames": frames,
+    "drop_in": drop_in, "frames": frames, "threads": threads,
     "viewer": lambda run: table(("from", "to", "milliseconds"), (row.values() for row in run["rows"])),
     "note": lambda run: run.get("note", "All systems are of one run"),
     "wrong": lambda run: f"{run['hits']['wrong']} wrong hits in {run['hits']['rays'] / 1e6:.1f} million rays",
