@@ -73,7 +73,7 @@ def _one(work: Callable[[Task], Result], task: Task, step: Callable[[Task], None
 
 
 def _sent(work: Callable[[Task], Result], task: Task) -> Result:
-    """``work(task)`` in a child. An error that could not be sent is told in words: the pool would lose them."""
+    """``work(task)`` in a child. An error that cannot be sent becomes one of words: the pool would lose it."""
     try:
         return work(task)
     except Exception as error:

@@ -59,7 +59,7 @@ def _run(options: argparse.Namespace, command: str) -> int:
 
     options.output.mkdir(parents=True, exist_ok=True)
     stored, drawn = options.output / "benchmark.json", options.output / "benchmark.html"
-    # Tried and read first, so that a fault is not told after an hour of measuring.
+    # Tried and read first, so that a fault shows before an hour of measuring.
     for output in (drawn,) if options.page_only else (stored, drawn):
         check_writable(output)
     if not options.page_only:

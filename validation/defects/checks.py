@@ -43,7 +43,7 @@ _SCENES = {"glass": PictureEffort(size=128, lower=64), "stairs": PictureEffort(s
 # reference is enough to raise a disagreement; exact arithmetic decides which side is wrong.
 _EMBREE = tuple(reference for reference in REFERENCES if reference.key == "embree_robust")
 _HITS = HitEffort(rays=3_000, exact=40, leaks=20_000, references=_EMBREE)
-# Other libraries are not asked: they judge nothing here.
+# Without other libraries: they judge nothing here.
 _QUERIES = section.QueryEffort(random=3_000, nasty=12_000, beside=0, distances=240, rays=40, drop_in=1)
 # Some hundred rays from each body, a few of which are judged to their end.
 _STARTS = starts.StartEffort(rays=20_000, exact=1_200)

@@ -57,7 +57,7 @@ class HitArrays:
 
     @classmethod
     def told(cls, t: Floats, face: Ints) -> "HitArrays":
-        """The hits that a renderer under test told: one that contradicts itself is made a hit at t = -1.
+        """The hits of a renderer under test: one that contradicts itself is made a hit at t = -1.
 
         That is right for no ray, so it is judged wrong, where an exception would judge nothing.
         """

@@ -31,7 +31,7 @@ def steps() -> int:
 
 
 def check_mirrors(job: Job, rays: int | None = None, make: Callable[..., Any] = Octree) -> Any:
-    """Reflect rays in all bodies; returns records for JSON and the gates. ``make`` builds what is asked."""
+    """Reflect rays in all bodies; returns records for JSON and the gates. ``make`` builds the tracer."""
     count = rays or (QUICK if job.quick else FULL)
     records, gates = [], []
     for number, (name, mesh) in enumerate(mirror_bodies().items()):

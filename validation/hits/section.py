@@ -79,7 +79,7 @@ def run(job: Job) -> tuple[dict[str, Any], list[Gate]]:
 
 
 def _add_own(result: dict[str, Any], effort: HitEffort, job: Job) -> list[Gate]:
-    """Add to the record what only the suite's own meshes and scenes are asked; returns the gates."""
+    """Add to the record the checks of the suite's own meshes and scenes; returns the gates."""
     records, gates = scenes.check_scenes(job)
     result["meshes"] += records
     result["leaks"], found = check_leaks(effort, job)

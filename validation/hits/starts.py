@@ -88,7 +88,7 @@ def steps() -> int:
 
 
 def check_starts(job: Job, effort: StartEffort | None = None, make: Callable[..., Any] = Octree) -> Any:
-    """Ask every body; returns records for JSON, one a family, and the gates. ``make`` builds what is asked."""
+    """Trace rays at every body; returns records for JSON, one a family, and the gates. ``make`` builds the tracer."""
     effort = effort or (QUICK if job.quick else FULL)
     all_bodies = list(bodies())
     share = StartEffort(-(-effort.rays // len(all_bodies)), -(-effort.exact // len(all_bodies)))

@@ -46,7 +46,7 @@ _HEIGHTS = (0.0, 1e3 / 3.0)
 
 
 class Row(NamedTuple):
-    """Some pictures: how many pixels were asked, and how many see what they cannot, or the largest relative error."""
+    """Some pictures: the number of pixels, and of those that see what they cannot, or the largest relative error."""
 
     subject: str
     pixels: int

@@ -1,4 +1,4 @@
-"""A row of the section: a promise, how often it was asked, how often it was broken, and who judged."""
+"""A row of the section: a promise, how often it was checked, how often it was broken, and who judged."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 
 def row(promise: str, judge: str, kept: NDArray[np.bool_]) -> dict[str, Any]:
-    """The row of a promise that was kept where ``kept`` says so; one that was never asked was broken.
+    """The row of a promise that was kept where ``kept`` says so; one that was never checked was broken.
 
     An empty array has any type, as that of an empty list does: where no ray hits, a judge of hits has none to judge.
     """

@@ -19,7 +19,7 @@ _SEED = 2043
 
 
 def check_contacts(count: int, job: Job) -> list[dict[str, Any]]:
-    """A row for each solid: how many rays were asked, and the wrong answers of ours and of others."""
+    """A row for each solid: the number of rays, and the wrong answers of ours and of others."""
     rows, rng = [], np.random.default_rng(_SEED)
     for solid in solids():
         job.step(f"queries: all hits, {solid.name}")

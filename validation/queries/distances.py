@@ -58,7 +58,7 @@ def points_about(mesh: Mesh, rng: Generator, count: int) -> Floats:
 
 
 def check_distances(count: int, job: Job) -> list[dict[str, Any]]:
-    """A row for each mesh: how many points were asked, our largest error in ulp, and the wrong answers of others."""
+    """A row for each mesh: the number of points, our largest error in ulp, and the wrong answers of others."""
     rows, rng = [], np.random.default_rng(_SEED)
     for name, mesh in meshes().items():
         job.step(f"queries: distance, {name}")

@@ -11,7 +11,7 @@ from validation.queries.peers import peers
 from validation.queries.solids import Solid, nasty_points, random_points, solids
 
 _SEED = 2041
-# Offsets and scales at which each solid is asked: far away, tiny and huge, all exact in float64.
+# Offsets and scales of each solid: far away, tiny and huge, all exact in float64.
 PLACES = ((0.0, 1.0), (2.0**20, 1.0), (0.0, 2.0**-40), (2.0**20, 2.0**20))
 
 
@@ -19,7 +19,7 @@ _SIGNED = 1000
 
 
 def check_inside(random: int, nasty: int, beside: int, job: Job) -> list[dict[str, Any]]:
-    """A row for each solid and kind of point: how many were asked, and the wrong answers of ours and of others.
+    """A row for each solid and kind of point: the number of points, and the wrong answers of ours and of others.
 
     random, nasty  points of each kind, over all solids and places
     beside         how many of each kind the other libraries are asked

@@ -1,4 +1,4 @@
-"""The other libraries that are asked what ours is: trimesh over embreex, libigl, and Open3D where it is installed."""
+"""The other libraries that answer the same queries: trimesh over embreex, libigl, and Open3D where it is installed."""
 
 from contextlib import suppress
 from functools import cache

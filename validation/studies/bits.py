@@ -18,14 +18,14 @@ _SEED = 2044
 _OFF = 1e-5
 # Exact rays start on the face itself, which they must not meet: they begin behind it, nearer than any other face is.
 _BEGIN = 1e-9
-# On which side of its horizon a direction lies is told by rounded numbers: nearer to it than this, either will do.
+# Rounding decides on which side of its horizon a direction lies: nearer to it than this, either will do.
 _LEVEL = 1e-12
 # Of the bits on which both agree, so many are judged too.
 _SAMPLE = 300
 
 
 def check_bits(name: str, points: int, directions: int) -> dict[str, Any]:
-    """A row: bits asked, those that Embree has otherwise, and the wrong ones of each, by exact arithmetic."""
+    """A row: the number of bits, those that Embree has otherwise, and the wrong ones of each, by exact arithmetic."""
     mesh = bodies()[name]
     rng = np.random.default_rng(_SEED)
     place = face_points(mesh)

@@ -24,7 +24,7 @@ Ints = NDArray[np.int64]
 _SEED = 2046
 # Lifted by so much of the largest coordinate: above what float32 rounds off, and so little that it changes few bits.
 _LIFT = 2.0**-21
-# On which side of its horizon a direction lies is told by rounded numbers: nearer to it than this, either will do.
+# Rounding decides on which side of its horizon a direction lies: nearer to it than this, either will do.
 _LEVEL = 1e-12
 # Of the bits on which both agree, so many are judged too.
 _SAMPLE = 300
@@ -101,7 +101,7 @@ CHECKS = tuple((name, kind) for kind in KINDS for name in MESHES)
 
 
 def check_corners(index: int, quick: bool) -> dict[str, Any]:
-    """A row: bits asked, those that a lifted start has otherwise, those judged, and the wrong ones; with them the
+    """A row: the number of bits, those that a lifted start has otherwise, those judged, the wrong ones, and the
     points whose share of the sky is another one where their face is named.
     """
     name, kind = CHECKS[index]

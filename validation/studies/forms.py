@@ -15,7 +15,7 @@ from renderer.studies import ambient_occlusion, openness, sky_view_factor
 from validation.studies.bodies import FAR, awning, shaft, street, walls
 
 Floats = NDArray[np.float64]
-# Where a street's floor is asked: so many places across it, and as many streets.
+# Points across a street's floor, and the number of streets.
 _PLACES = 16
 # Tregenza's and Reinhart's patches, and numbers of a lattice.
 PATCHES = (145, 577)

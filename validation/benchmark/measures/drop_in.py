@@ -1,6 +1,6 @@
 """trimesh with the drop-in beside trimesh over embreex and trimesh alone: the calls of its users, from one ray on.
 
-``python -m validation.benchmark.measures.drop_in`` prints a table; ``--faces`` and ``--rays`` choose what is asked.
+``python -m validation.benchmark.measures.drop_in`` prints a table; ``--faces`` and ``--rays`` choose meshes and calls.
 """
 
 import argparse
@@ -22,7 +22,7 @@ QUICK_FACES, QUICK_RAYS = (1_000,), (1, 10, 1_000)
 FACES, RAYS = (*QUICK_FACES, 100_000), (*QUICK_RAYS, 100_000)
 _SEED = 15
 _LEAST = 50
-# The most rays or points that trimesh is asked, and the most faces on which it is alone, for the time that it takes:
+# The most rays or points of a call to trimesh, and the most faces on which it is alone, for the time that it takes:
 # with more a benchmark of all meshes takes longer than an hour.
 _MOST = {
     OURS: {},

@@ -107,7 +107,7 @@ KINDS = {
 
 
 def briefly(family: str, kind: Kind) -> bool:
-    """Whether meshes of other kinds than the series are asked this too."""
+    """Whether this query is measured on meshes of other kinds than the series too."""
     return kind.name == "closest" or (kind.name == "any" and family in _ENDED)
 
 

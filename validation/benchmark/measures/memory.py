@@ -73,7 +73,7 @@ def resident() -> int:
 
 
 def most_resident() -> int:
-    """The most resident bytes of this process since ``resident`` was asked."""
+    """The most resident bytes of this process since ``resident`` was called."""
     return _bytes("VmHWM")
 
 

@@ -72,7 +72,7 @@ class Chosen(NamedTuple):
 
     @property
     def brief(self) -> bool:
-        """Whether only first hits are asked, and not by slow contenders, so that a run with all kinds ends."""
+        """Whether only first hits are measured, without slow contenders, so that a run with all kinds ends."""
         return self.kind in FORMS
 
 

@@ -24,7 +24,7 @@ _STEPS = tuple(2.0**power for power in (-1.0, -0.5, -0.25, 0.0, 0.25, 0.5, 1.0, 
 class Shade(NamedTuple):
     """A step of the map: its CSS class, its least ratio, and background and text in the light and the dark theme.
 
-    Orange below 1 and blue above are told apart by the colour-blind too. Every text has a contrast of 4.5 at least.
+    Orange below 1 and blue above can be distinguished by the colour-blind. Every text has a contrast of 4.5 at least.
     """
 
     name: str

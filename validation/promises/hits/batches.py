@@ -84,7 +84,7 @@ def _shaped(octree: Octree, origins: Floats, down: Floats) -> NDArray[np.bool_]:
 
 
 def check_refits() -> list[dict[str, Any]]:
-    """Trees refitted to meshes stretched, shrunk and moved along each axis, asked along each axis."""
+    """Trees refitted to meshes stretched, shrunk and moved along each axis, with rays along each axis."""
     found: dict[str, list[NDArray[np.bool_]]] = {name: [] for name in "xyz"}
     mesh = _lattice()
     for axis, name in enumerate("xyz"):

@@ -15,7 +15,7 @@ from validation.promises.row import row
 # Either side of where packets, small chunks and full chunks end.
 _COUNT, _ROWS = 17000, (0, 1, 15, 16, 1023, 1024, 8191, 8192, 16999)
 _FEW = 5
-# Whole numbers of rays by which bounds are told from rays of other dimensions.
+# Whole numbers of rays that distinguish bounds from rays of other dimensions.
 _DIMENSIONS = (3, 4)
 _BOUNDS = (np.nan, -1.0, -np.inf, -(2.0**-1074))
 _WRONG: dict[str, tuple[Any, ...]] = {"origins": (np.nan, np.inf, -np.inf), "directions": (np.nan, np.inf, 0.0)}

@@ -53,7 +53,7 @@ def _kept(tracer: Octree | BruteForce, origins: Floats, directions: Floats, boun
 
 
 def _near(tracer: Octree | BruteForce, rng: Generator, order: Order) -> list[bool]:
-    """Points in rows and columns with limits of their own: more of them than are asked in one order."""
+    """Points in rows and columns with limits of their own: more than one query orders at once."""
     points = np.asarray(2.0 * rng.normal(size=(8, 9, 3)), order=order)
     limits = np.asarray(rng.uniform(0.0, 2.0, (8, 9)), order=order)
     found = tracer.closest_point(points, limits).face

@@ -22,7 +22,7 @@ def check_codes() -> list[dict[str, Any]]:
     off = _ULPS * np.spacing(starts)
     below, above = starts - off, starts + off
     wide = (srgb(above) == codes) & (srgb(below) == codes - 1)
-    # The nearest float32 on either side of what float64 says are told apart as float64 tells them.
+    # The float32 numbers at and beside each start have the codes of the same float64.
     single = np.concatenate([starts.astype(np.float32) + k * np.spacing(starts.astype(np.float32)) for k in (-1, 0, 1)])
     first = np.array([_first(below[i], above[i], codes[i]) for i in range(255)])
     expected = np.tile(codes - 1, 3) + (single.astype(np.float64) >= np.tile(first, 3))

@@ -27,7 +27,7 @@ def check_edges(rng: Generator) -> list[dict[str, Any]]:
     for number, faces in enumerate((*_piles(rng), *_boxes())):
         last, at = int(faces.max()), faces
         places = rng.normal(size=(last + 1, 3))
-        # Edges are told by position: every other time the last vertex is where the first one is.
+        # Vertices at one position count as one: every other time the last vertex is where the first one is.
         if number % 2:
             places[last], at = places[0], np.where(faces == last, 0, faces)
         mesh = Mesh(places, faces)

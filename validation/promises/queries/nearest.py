@@ -25,7 +25,7 @@ _VANISHING = Fraction(1, 2**900)
 # Where the nearest point is, as a share of the farthest corner's distance: u and v are quotients of float64.
 _OF_REACH = 2.0**-40
 _WEDGES, _PLACES = 64, 128
-# How near an edge a point is asked, in powers of two of the edge: below 2^-41 products are computed with all digits.
+# The distance of a point from an edge, in powers of two of the edge: below 2^-41 products are computed with all digits.
 _AWAY = -41.5, -39.0
 _SHELLS, _FACES = 20, 48
 _CORNER = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])

@@ -27,11 +27,11 @@ _ORDER = 6
 _APART = 4096.0
 # Faces of a group, and how unlike they are: leaves of a block and of three, a node, and a node of nodes.
 _FACES = ((4, 1.0), (10, 0.01), (24, 1.0), (160, 1.0))
-# How far away a group is asked, in radii: from the last on order 6 is 2^6 times as much as what is left out.
+# The distance of a group, in radii: from the last on order 6 is 2^6 times as much as what is left out.
 _RADII = (4.0, 32.0, 256.0)
 # A face's own numbers err by some 2^-48 of its size, both here and there; the least error that is sought is 2^-40.
 _ROUNDING = 2.0**-45
-# Of a radius, towards the point: from far away to where a series is the last that may be asked.
+# Of a radius, towards the point: from far away to where a series may still be used.
 _NEARNESS = np.array([0.1, 0.2, 0.35, 0.5, 0.6, 0.7, 0.74])
 # How much a bound may be above what it bounds: what the farther of two faces adds, 8^-5 of it, and their widths.
 _SLACK = 1.001
@@ -97,7 +97,7 @@ def _bounds(rng: Generator) -> list[dict[str, Any]]:
 
 
 def _bounds_kept(rng: Generator, copies: int, leaf_size: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Of such groups of one kind which bounds are right, and which series are asked as they should."""
+    """Of such groups of one kind, whether each bound is right, and whether series are used as they should be."""
     mesh, points, away = _in_line(rng, copies)
     octree = Octree.from_mesh(mesh, leaf_size=leaf_size)
     moments, scale, found = moments_of(octree.tree, 1), octree.tree.scale, np.zeros((len(points), 3))

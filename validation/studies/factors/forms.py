@@ -25,7 +25,7 @@ ERRORS = 8.0
 UNSEEN = 15.0
 # Of the area: what rounding leaves of an exact exchange, a thousand times the 1e-12 of a contour integral's terms.
 ROUNDING = 1e-9
-# The standard error that rows are asked for, of all their entries together.
+# The requested standard error of rows, of all their entries together.
 _QUICK, _FULL = 0.005, 0.002
 # Enough for that at any share: rows end when their error is reached.
 _RAYS = 1 << 21

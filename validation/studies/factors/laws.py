@@ -160,5 +160,5 @@ CHECKS = {
 
 
 def check(name: str) -> dict[str, Any]:
-    """A row: answers asked, and how many are not as they must be."""
+    """A row: the number of answers, and of those that are not as they must be."""
     return row_of(name, CHECKS[name])

@@ -11,7 +11,7 @@ from validation.oracle.vectors import rational
 from validation.stability.cases.case import ExtremeCase, Outcome
 from validation.stability.cases.judgement import SEED, Floats
 
-# Places and sizes at which each mesh is asked: offset and scale.
+# Places and sizes of each mesh: offset and scale.
 PLACES = ((0.0, 1.0), (1e6, 1.0), (0.0, 1e-6), (1e6, 1e6))
 
 
