@@ -155,7 +155,7 @@ def drop_in(run: Record) -> str:
 
 
 def threads(run: Record) -> str:
-    """How many times as much two threads do as one, over all kinds of queries."""
+    """The speed of two threads over that of one, median of all queries."""
     of = [row["mrays"]["ours"] / row["mrays"]["ours_one_thread"] for row in run["queries"]]
     return f"{median(of):.2f}"
 

@@ -23,7 +23,7 @@ def pack(scene: Scene, needs: Features | None = None) -> tuple[Mesh, SceneArrays
     """The merged mesh of all instances in their order, and everything else that the kernel reads.
 
     Arrays that ``needs`` does not name are left empty; for None, those that the scene does not need; and ``touching``,
-    which ``touching.find_touching`` makes.
+    which ``touching.touching_faces`` makes.
     """
     needs = needs_of(scene) if needs is None else needs
     instances = scene.instances

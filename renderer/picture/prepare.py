@@ -17,7 +17,7 @@ from renderer.picture.camera_rays import TILE, rays_of_tiles, tile_side
 from renderer.picture.image import PLANES, Image
 from renderer.picture.pack import media_around, pack
 from renderer.picture.placed import placed, placed_arrays
-from renderer.picture.touching import find_touching, touching_faces
+from renderer.picture.touching import touching_faces
 from renderer.rayscene.built import BuiltScene, SceneTree
 from renderer.scene.camera import Camera
 from renderer.scene.needs import Features
@@ -109,7 +109,8 @@ class PreparedScene:
         >>> bool(prepare(Scene(camera=eye, materials={"grey": Phong()}, objects=[cube, cube])).touching.all())
         True
         """
-        marks = touching_faces(self.tree, self.arrays, available_threads(), every=True)
+        threads = available_threads()
+        marks = touching_faces(_searched(self.built, self.tree, self.needs, threads), self.arrays, threads, True)
         placed = isinstance(self.tree, SceneTree) and len(marks) > 0
         return np.repeat(marks, [i.faces for i in self.scene.instances]) if placed else marks
 
@@ -186,12 +187,19 @@ def _with_touching(
     threads: int,
     clock: Stopwatch,
 ) -> PreparedScene:
-    tree = searched = built.top if isinstance(built, BuiltScene) else tree_for(built, needs)
-    if isinstance(built, BruteForce) and needs.refraction:
-        # All faces against all others would take longer than the picture.
-        searched = tree_for(Octree.from_mesh(built.mesh, threads=threads), needs)
-    arrays = find_touching(searched, arrays, needs, threads)
+    tree = built.top if isinstance(built, BuiltScene) else tree_for(built, needs)
+    if needs.refraction:
+        arrays = arrays._replace(touching=touching_faces(_searched(built, tree, needs, threads), arrays, threads))
     return PreparedScene(scene, built, needs, arrays, tree, clock.seconds())
+
+
+def _searched(built: Octree | BruteForce | BuiltScene, tree: Any, needs: Features, threads: int) -> Any:
+    """The tree through which touching faces are found: an octree also for brute force, unless the faces are few. All
+    faces against all others would take longer than the picture.
+    """
+    if isinstance(built, BruteForce) and needs.octree:
+        return tree_for(Octree.from_mesh(built.mesh, threads=threads), needs)
+    return tree
 
 
 def _bundles_in_a_row(tree: Tree | SceneTree) -> int:

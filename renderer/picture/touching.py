@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.rayscene.built import SceneTree
-from renderer.scene.needs import Features
 from renderer.shade.surface import SceneArrays
 from renderer.shade.touching import mark_touching
 from renderer.system.threads import for_chunks
@@ -15,11 +14,6 @@ from renderer.trace.layout import Tree
 from renderer.trace.walk import stack_size
 
 _CHUNK = 4096
-
-
-def find_touching(tree: Tree | SceneTree, arrays: SceneArrays, needs: Features, threads: int) -> SceneArrays:
-    """``arrays`` with ``touching``."""
-    return arrays._replace(touching=touching_faces(tree, arrays, threads)) if needs.refraction else arrays
 
 
 def touching_faces(tree: Tree | SceneTree, arrays: SceneArrays, threads: int, every: bool = False) -> NDArray[np.uint8]:

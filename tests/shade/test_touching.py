@@ -17,7 +17,7 @@ from renderer.mesh.shapes import box, grid, icosphere
 from renderer.picture.image import Image
 from renderer.picture.prepare import prepare_scene
 from renderer.picture.render import render
-from renderer.picture.touching import find_touching
+from renderer.picture.touching import touching_faces
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.light import DirectionalLight
 from renderer.scene.needs import needs_of
@@ -298,8 +298,8 @@ class TestTouchingFaces:
         octree, brute = (prepare_scene(what, needs, accelerator, threads=2) for accelerator in ("octree", "brute"))
         found = octree.arrays.touching
         # Through the octree, and among all faces.
-        for other in (brute.arrays, find_touching(brute.tree, brute.arrays, needs, 2)):
-            np.testing.assert_array_equal(other.touching, found)
+        for other in (brute.arrays.touching, touching_faces(brute.tree, brute.arrays, 2)):
+            np.testing.assert_array_equal(other, found)
         return np.flatnonzero(found).tolist()
 
     def test_none_of_bodies_that_stand_alone(self) -> None:

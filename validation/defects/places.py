@@ -64,11 +64,9 @@ def find_definition(package: Path, name: str) -> Place:
     places = [
         place
         for path in _files(package, name.rpartition(".")[2])
-        if any(
-            f".{module_of(path, package)}{own}".endswith(f".{name}") for own in _names_in(_sources(package)[path])[0]
-        )
+        if any(_ends(module_of(path, package) + own, name) for own in _names_in(_sources(package)[path])[0])
         for place in _defined(path, package)
-        if f".{place.name}".endswith(f".{name}")
+        if _ends(place.name, name)
     ]
     return _one(places, "name", name)
 
@@ -79,7 +77,7 @@ def find_name(package: Path, name: str) -> tuple[str, str]:
     importing = [
         module
         for path in _files(package, last)
-        if f".{(module := module_of(path, package))}.{last}".endswith(f".{name}")
+        if _ends(f"{(module := module_of(path, package))}.{last}", name)
         for imported in _names_in(_sources(package)[path])[1]
         if imported == last
     ]
@@ -90,6 +88,11 @@ def find_name(package: Path, name: str) -> tuple[str, str]:
             return importing[0], last
         raise
     return found.module, found.name.removeprefix(f"{found.module}.")
+
+
+def _ends(whole: str, name: str) -> bool:
+    """Whether a dotted name ends with another, part by part."""
+    return f".{whole}".endswith(f".{name}")
 
 
 def module_of(path: Path, package: Path) -> str:
