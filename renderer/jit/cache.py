@@ -14,7 +14,6 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
-from logging import getLogger
 from pathlib import Path
 from stat import S_ISREG
 from typing import Any
@@ -28,6 +27,7 @@ from numba.core.serialize import dumps
 
 from renderer.jit.digest import PACKAGE, is_ours, source_digest
 from renderer.jit.levels import AHEAD_VARIABLE, LEVELS, lacking
+from renderer.jit.notice import warn_once
 from renderer.jit.turns import turn, wait_no_more
 from renderer.lazy import lazy
 from renderer.system.files import write_atomically
@@ -38,7 +38,6 @@ _SUFFIX = ".kernel"
 _HEADER = b"octree-renderer kernel 1\n"
 # To be changed when older machine code is no longer right, for a reason that no digest of kernels' sources shows.
 _FORM = "private pieces"
-_LOG = getLogger("renderer.jit")
 
 
 @dataclass(frozen=True)
@@ -53,6 +52,8 @@ class Folders:
 
 class KernelStore:
     """The files of one kernel, with the interface that Numba's dispatchers expect of a cache."""
+
+    suffix = _SUFFIX
 
     def __init__(self, function: Any) -> None:
         self._function = function
@@ -87,7 +88,9 @@ class KernelStore:
         if folders.written is None or self._digest is None:
             return True
         begin = f"{self._prefix()}{_short(self._digest)}-"
-        return any(name.startswith(begin) for folder in (*folders.read, *ahead_folders()) for name in _names(folder))
+        return any(
+            name.startswith(begin) for folder in (*folders.read, *ahead_folders()) for name in self._names(folder)
+        )
 
     def load_overload(self, signature: Any, context: Any) -> CompileResult | None:
         """The kernel compiled for the types in ``signature``, or None if it must be compiled."""
@@ -100,7 +103,7 @@ class KernelStore:
                     return self._rebuilt(signature, context, payload)
         return None
 
-    def _rebuilt(self, signature: Any, context: Any, payload: Any) -> CompileResult:
+    def _rebuilt(self, signature: Any, context: Any, payload: Any) -> CompileResult | None:
         return CompileResult._rebuild(context, *payload)
 
     @contextmanager
@@ -124,34 +127,43 @@ class KernelStore:
 
     def keep(self, signature: Any, compiled: CompileResult) -> None:
         """Write a kernel for other processes, and remove those compiled from other sources."""
+        if not self._is_written(signature, compiled):
+            _Count.lost += 1
+
+    def _is_written(self, signature: Any, compiled: CompileResult) -> bool:
         folder = _folders(self._home).written
         if folder is None or not self.knows(signature) or compiled.library.has_dynamic_globals:
-            _Count.lost += 1
-            return
+            return False
         key = self._key(signature, compiled.library.codegen.magic_tuple())
         path = folder / self._file(key)
         try:
             _write(path, key, dumps(_needed(compiled._reduce())))
         except OSError as error:
-            _Count.lost += 1
-            _warn_once("unwritable", f"compiled kernels cannot be kept: {path}: {error.strerror}")
-            return
+            warn_once("unwritable", f"compiled kernels cannot be kept: {path}: {error.strerror}")
+            return False
         current = f"{self._prefix()}{_of_sources(key[1])}"
-        for name in _names(folder):
+        for name in self._names(folder):
             if name.startswith(self._prefix()) and not name.startswith(current):
                 with suppress(OSError):
                     (folder / name).unlink()
+        return True
 
     def _places(self, signature: Any, machine: tuple[str, ...]) -> Iterable[tuple[Path, tuple[str, ...]]]:
-        own = self._key(signature, machine)
-        for folder in _folders(self._home).read:
-            yield folder / self._file(own), own
+        yield from self._own_places(signature, machine)
         ahead = ahead_folders()
         for processor in ("", *runnable_levels()) if ahead else ():
             level = (machine[0], LEVELS[processor], "") if processor else machine
             key = self._key(signature, level)
             for folder in ahead:
                 yield folder / self._file(key), key
+
+    def _own_places(self, signature: Any, machine: tuple[str, ...]) -> Iterator[tuple[Path, tuple[str, ...]]]:
+        own = self._key(signature, machine)
+        for folder in _folders(self._home).read:
+            yield folder / self._file(own), own
+
+    def _names(self, folder: Path) -> list[str]:
+        return _names(folder, self.suffix)
 
     def _key(self, signature: Any, machine: tuple[str, ...]) -> tuple[str, ...]:
         return (str(signature), str(self._digest), _versions(), *machine, f"svml {config.USING_SVML}")
@@ -161,7 +173,7 @@ class KernelStore:
         return f"{self._name}-{short}-"
 
     def _file(self, key: tuple[str, ...]) -> str:
-        return f"{self._prefix()}{_short(key[1])}-{_hash(key)}{_SUFFIX}"
+        return f"{self._prefix()}{_short(key[1])}-{hash_of(key)}{self.suffix}"
 
 
 def digest_of(function: Any) -> str | None:
@@ -175,6 +187,11 @@ def digest_of(function: Any) -> str | None:
 def keep_in(folder: Path) -> None:
     """From now on, write and read compiled kernels only in ``folder``."""
     _Chosen.folders = Folders(folder, (folder,))
+
+
+def is_chosen() -> bool:
+    """Whether ``keep_in`` has chosen the folder."""
+    return _Chosen.folders is not None
 
 
 def ahead_folders() -> tuple[Path, ...]:
@@ -214,7 +231,7 @@ def runnable_levels() -> tuple[str, ...]:
 
 def stored_in(folder: Path) -> int:
     """The number of kernels in a folder."""
-    return len(_names(folder))
+    return len(_names(folder, _SUFFIX))
 
 
 @cache
@@ -233,7 +250,7 @@ def _short(digest: str) -> str:
     return _of_sources(digest) + digest[-8:]
 
 
-def _hash(key: tuple[str, ...]) -> str:
+def hash_of(key: tuple[str, ...]) -> str:
     return hashlib.sha256("\0".join(key).encode()).hexdigest()[:16]
 
 
@@ -283,9 +300,9 @@ def _can_write(folder: Path) -> bool:
     return True
 
 
-def _names(folder: Path) -> list[str]:
+def _names(folder: Path, suffix: str) -> list[str]:
     try:
-        return [name for name in os.listdir(folder) if name.endswith(_SUFFIX)]
+        return [name for name in os.listdir(folder) if name.endswith(suffix)]
     except OSError:
         return []
 
@@ -299,7 +316,7 @@ def _read(path: Path, key: tuple[str, ...]) -> Any:
     except FileNotFoundError:
         return None
     except OSError as error:
-        _warn_once("unreadable", f"a compiled kernel cannot be read and is compiled anew: {path}: {error.strerror}")
+        warn_once("unreadable", f"a compiled kernel cannot be read and is compiled anew: {path}: {error.strerror}")
         return None
     head, body = content[: len(_HEADER)], content[len(_HEADER) + 32 :]
     with _tolerant(path):
@@ -317,7 +334,7 @@ def _tolerant(path: Path) -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        _warn_once("damaged", f"a compiled kernel is damaged and is compiled anew: {path}: {error}")
+        warn_once("damaged", f"a compiled kernel is damaged and is compiled anew: {path}: {error}")
 
 
 def _needed(reduced: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -334,13 +351,3 @@ def _write(path: Path, key: tuple[str, ...], payload: bytes) -> None:
         with suppress(OSError):
             path.unlink()
     write_atomically(path, lambda file: file.write(_HEADER + hashlib.sha256(body).digest() + body))
-
-
-_said: set[str] = set()
-
-
-def _warn_once(kind: str, message: str) -> None:
-    """Log the first message of each kind: if one kernel's file has a fault, most have it."""
-    if kind not in _said:
-        _said.add(kind)
-        _LOG.warning(message)

@@ -17,14 +17,11 @@ from functools import update_wrapper
 from importlib import import_module
 from typing import Any
 
-import llvmlite.binding as llvm  # type: ignore[import-untyped]
 from numba.core import types
-from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, CompileResult, compile_result
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import LoweringPass, PassManager, register_pass
 from numba.core.datamodel.models import OpaqueModel
-from numba.core.environment import lookup_environment
 from numba.core.imputils import lower_constant
 from numba.core.registry import CPUDispatcher
 from numba.core.serialize import dumps
@@ -40,7 +37,9 @@ from numba.extending import register_model
 
 from renderer.jit.apart import ApartStore, write_symbol
 from renderer.jit.cache import KernelStore
+from renderer.jit.libraries import EntryLibrary, PieceLibrary
 from renderer.jit.notice import compiling
+from renderer.jit.pieces import PieceStore
 from renderer.lazy import lazy
 
 # No array is allocated in a kernel, so none counts references: Numba's counts take a locked instruction each.
@@ -63,82 +62,6 @@ OPTIONS = {
 }
 
 
-class _PieceLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """A function's module as lowered, simplified, but neither inlined nor compiled."""
-
-    _merged: Any = None
-
-    def _optimize_functions(self, module: Any) -> None:
-        module.data_layout = self._codegen._data_layout
-
-    def finalize(self) -> None:
-        # Each function alone first, as Numba does: what is inlined then is small. Worth 2 % of tracing.
-        module = self._final_module
-        for function in module.functions:
-            if not function.is_declaration:
-                passes, builder = self._codegen._function_pass_manager()
-                passes.run(function, builder)
-        for library in self._linking_libraries:
-            self._reload_init |= library._reload_init
-        self._finalized = True
-
-    def _get_module_for_linking(self) -> Any:
-        """This module with all below it, for kernels that Numba compiles without this module."""
-        if self._merged is None:
-            module = self._final_module.clone()
-            _link_all(module, self._linking_libraries)
-            for function in module.functions:
-                if not function.is_declaration:
-                    function.linkage = "linkonce_odr"
-            self._merged = module
-        return self._merged
-
-
-class _EntryLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """A wrapper for Python, or a function with a symbol, and all pieces behind it, optimised together."""
-
-    def _optimize_functions(self, module: Any) -> None:
-        module.data_layout = self._codegen._data_layout
-
-    def finalize(self) -> None:
-        self._codegen._check_llvm_bugs()
-        module = self._final_module
-        outer = [function.name for function in module.functions if not function.is_declaration]
-        _link_all(module, self._linking_libraries)
-        for function in module.functions:
-            if not function.is_declaration and function.name not in outer:
-                # Private, so that it is dropped where it is inlined everywhere, and has no symbol. An internal function
-                # has one, by which another kernel's call of the same piece would find this function, whose arguments
-                # the optimiser may have changed.
-                function.linkage = "private"
-        passes, builder = self._codegen._module_pass_manager()
-        passes.run(module, builder)
-        module.verify()
-        self._finalize_final_module()
-
-    def serialize_using_object_code(self) -> Any:
-        """The machine code. Of the module only the names remain: kernels that call this one link its piece."""
-        names = [f.name for f in self._final_module.functions if not f.is_declaration and f.linkage.name == "external"]
-        stub = llvm.parse_assembly("\n".join(f'define void @"{name}"() {{ ret void }}' for name in names))
-        return (self.name, "object", (self._get_compiled_object(), stub.as_bitcode()))
-
-
-def _link_all(module: Any, libraries: list[Any]) -> None:
-    """Link libraries and their dependencies into ``module``, each once."""
-    done: set[int] = set()
-    pending = list(libraries)
-    while pending:
-        library = pending.pop()
-        if id(library) in done:
-            continue
-        done.add(id(library))
-        if isinstance(library, _PieceLibrary):
-            module.link_in(library._final_module, preserve=True)
-            pending += library._linking_libraries
-        else:  # a function of Numba's own
-            module.link_in(library._get_module_for_linking(), preserve=True)
-
-
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _LowerPiece(NativeLowering):  # type: ignore[misc]
     """Lower a function for kernels only."""
@@ -146,7 +69,10 @@ class _LowerPiece(NativeLowering):  # type: ignore[misc]
     _name = "renderer_lower_piece"
 
     def run_pass(self, state: Any) -> bool:
-        state.library = _PieceLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        unique = _kernels[state.func_id.func].piece_store.unique(state.args, state.targetctx)
+        if unique is not None:
+            state.func_id.unique_id = state.func_ir.func_id.unique_id = unique
+        state.library = PieceLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         state.flags.no_cpython_wrapper = True
         super().run_pass(state)
@@ -212,8 +138,8 @@ def _keep(store: KernelStore, arguments: Any, compiled: CompileResult) -> None:
         store.keep(arguments, compiled)
 
 
-def _library_of(piece: Any, state: Any) -> _EntryLibrary:
-    library = _EntryLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+def _library_of(piece: Any, state: Any) -> EntryLibrary:
+    library = EntryLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
     library.enable_object_caching()
     library.add_linking_library(piece.library)
     return library
@@ -235,8 +161,8 @@ def _apart_of(piece: Any, state: Any, symbol: str) -> CompileResult:
     return _result(state, piece, library, entry_point=None, fndesc=descriptor)
 
 
-def _result(state: Any, piece: Any, library: _EntryLibrary, **fields: Any) -> CompileResult:
-    _set_environments(library)
+def _result(state: Any, piece: Any, library: EntryLibrary, **fields: Any) -> CompileResult:
+    library.set_environments()
     return compile_result(
         typing_context=state.typingctx,
         target_context=state.targetctx,
@@ -251,13 +177,6 @@ def _result(state: Any, piece: Any, library: _EntryLibrary, **fields: Any) -> Co
         reload_init=list(piece.library._reload_init),
         **fields,
     )
-
-
-def _set_environments(library: Any) -> None:
-    for variable in library._final_module.global_variables:
-        environment = lookup_environment(variable.name) if variable.name.startswith("_ZN08NumbaEnv") else None
-        if environment is not None:
-            library.codegen.set_env(variable.name, environment)
 
 
 # The passes of Numba that kernels need: they have no closures, no ``with``, no array expressions, no object mode.
@@ -300,6 +219,21 @@ def _pipeline(name: str, passes: tuple[Any, ...]) -> PassManager:
 
 class _Piece(CPUDispatcher):  # type: ignore[misc]
     """A function as other kernels call it."""
+
+    def compile(self, arguments: Any) -> Any:
+        """As Numba's dispatchers compile, without their clocks: each that is nested slows all calls of LLVM below."""
+        with global_compiler_lock, self._compiling_counter:
+            found = self.overloads.get(arguments) or self._cache.load_overload(arguments, self.targetctx)
+            if found is None:
+                self._cache_misses[arguments] += 1
+                found = self._compiler.compile(arguments, None)
+                self.add_overload(found)
+                self._cache.save_overload(arguments, found)
+            elif arguments not in self.overloads:
+                self._cache_hits[arguments] += 1
+                self.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
+                self.add_overload(found)
+            return found.entry_point
 
     def add_overload(self, compiled: Any) -> None:
         # Left out of the dispatcher's table of functions that Python may call.
@@ -373,7 +307,15 @@ class Kernel:
     @lazy
     def piece(self) -> _Piece:
         """The dispatcher that kernels call."""
-        return _Piece(self.py_func, targetoptions=self._options, pipeline_class=_PieceCompiler)
+        piece = _Piece(self.py_func, targetoptions=self._options, pipeline_class=_PieceCompiler)
+        if self.kept:
+            piece._cache = self.piece_store
+        return piece
+
+    @lazy
+    def piece_store(self) -> PieceStore:
+        """The files of its pieces."""
+        return PieceStore(self.py_func)
 
     @lazy
     def apart(self) -> _Piece:

@@ -5,10 +5,10 @@ import os
 import re
 from collections.abc import Iterable
 from functools import cache
-from logging import getLogger
 from pathlib import Path
 
 from renderer.jit import loaded
+from renderer.jit.notice import warn_once
 
 PACKAGE = Path(__file__).resolve().parents[1]
 _IMPORT = re.compile(rf"^from ({PACKAGE.name}(?:\.\w+)*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
@@ -32,7 +32,7 @@ def source_digest(path: Path) -> str | None:
     newer = sorted(found for found in seen if found.stat().st_mtime > loaded.AT)
     if path not in seen or newer:
         why = f"{newer[0]} was written after this process began" if newer else f"{path} cannot be read"
-        _say_once(f"renderer: compiled kernels are neither kept nor looked for: {why}")
+        warn_once("sources", f"renderer: compiled kernels are neither kept nor looked for: {why}")
         return None
     digest = hashlib.sha256()
     for found in sorted(seen):
@@ -51,11 +51,6 @@ def reached(files: Iterable[Path]) -> set[Path]:
             seen.add(found)
             pending += imported_files(found)
     return seen
-
-
-@cache
-def _say_once(message: str) -> None:
-    getLogger("renderer.jit").warning(message)
 
 
 @cache

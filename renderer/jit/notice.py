@@ -38,6 +38,16 @@ class Stopwatch:
         return time.perf_counter() - compile_seconds() - self._began
 
 
+_said: set[str] = set()
+
+
+def warn_once(kind: str, message: str) -> None:
+    """Log the first message of each kind: if one kernel has a fault, most have it."""
+    if kind not in _said:
+        _said.add(kind)
+        _LOG.warning(message)
+
+
 @contextmanager
 def compiling(name: str, folder: str | None) -> Iterator[None]:
     """A context for compiling one kernel: logs it, and adds its time to ``compile_seconds``."""

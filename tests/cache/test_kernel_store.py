@@ -209,8 +209,8 @@ def test_the_first_compiling_is_said_on_one_line_that_can_be_turned_off(package,
 # Says when it links, which lasts until a line comes, and when it waits for another process.
 SAY = """
 import sys, time
-from renderer.jit import compiler, turns
-sound, sleep = compiler._EntryLibrary.finalize, time.sleep
+from renderer.jit import libraries, turns
+sound, sleep = libraries.EntryLibrary.finalize, time.sleep
 def finalize(library):
     print("links", flush=True)
     sys.stdin.readline()
@@ -218,7 +218,7 @@ def finalize(library):
 def say(seconds):
     print("waits", flush=True)
     sleep(seconds)
-compiler._EntryLibrary.finalize, time.sleep = finalize, say
+libraries.EntryLibrary.finalize, time.sleep = finalize, say
 """
 
 

@@ -42,7 +42,7 @@ def profile(what: str) -> tuple[dict[str, float], dict[str, float], float]:
     """Seconds by stage, by kernel and in total of compiling ``what``; for a process that has compiled nothing."""
     from numba.core import compiler_machinery, lowering
 
-    from renderer.jit import compiler
+    from renderer.jit import libraries
     from renderer.precompile import compile_ahead, compile_into
 
     stages, kernels = _Clocks(), _Clocks()
@@ -50,10 +50,10 @@ def profile(what: str) -> tuple[dict[str, float], dict[str, float], float]:
     by_kernel = kernels.around(lambda self, index, one, state: state.func_id.func_qualname, manager._runPass)
     manager._runPass = stages.around(lambda self, index, one, state: _stage(one.name()), by_kernel)
     clocked: tuple[tuple[Any, str, str], ...] = (
-        (compiler._EntryLibrary, "finalize", "LLVM: link and optimise"),
-        (compiler._EntryLibrary, "_finalize_final_module", "LLVM: machine code"),
+        (libraries.EntryLibrary, "finalize", "LLVM: link and optimise"),
+        (libraries.EntryLibrary, "_finalize_final_module", "LLVM: machine code"),
         (lowering.BaseLower, "lower_normal_function", "write LLVM's instructions"),
-        (compiler._PieceLibrary, "add_ir_module", "print and parse them"),
+        (libraries.PieceLibrary, "add_ir_module", "print and parse them"),
     )
     for owner, method, stage in clocked:
         setattr(owner, method, stages.around(lambda *a, stage=stage: stage, getattr(owner, method)))

@@ -1,0 +1,66 @@
+"""Pieces on disk: a function that several kernels contain is typed and lowered once, not in each process that compiles
+one of them.
+"""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from numba.core.compiler import CompileResult, compile_result
+
+from renderer.jit.cache import hash_of, is_chosen
+from renderer.jit.called import CalledStore
+from renderer.jit.libraries import Contained, Named, PieceLibrary
+
+
+class PieceStore(CalledStore):
+    """The files of one function's pieces."""
+
+    suffix = ".piece"
+
+    def unique(self, signature: Any, context: Any) -> str | None:
+        """What distinguishes its names from those of any other piece in any process; None if no file can stand for it.
+
+        Numba's own number is that of one process.
+        """
+        return hash_of(self._key(signature, context.codegen().magic_tuple())) if self.knows(signature) else None
+
+    def name(self, signature: Any, compiled: CompileResult) -> None:
+        """Give a piece the name by which other processes find it, if they would find all that it contains."""
+        below = compiled.library._linking_libraries
+        if self.knows(signature) and all(_is_found(library) for library in below):
+            function = self._function
+            place = function.__module__, function.__qualname__
+            compiled.library.named = Contained(*place, tuple(signature), compiled.fndesc.mangled_name)
+
+    def save_overload(self, signature: Any, compiled: CompileResult) -> None:
+        """Write a piece for other processes, unless they would not find it, or write to a folder to be carried away."""
+        self.name(signature, compiled)
+        if compiled.library.named is not None and not is_chosen():
+            self._is_written(signature, compiled)
+
+    def _places(self, signature: Any, machine: tuple[str, ...]) -> Iterable[tuple[Path, tuple[str, ...]]]:
+        return self._own_places(signature, machine)
+
+    def _rebuilt(self, signature: Any, context: Any, payload: Any) -> CompileResult | None:
+        stored, descriptor, environment, result, *_ = payload
+        library = PieceLibrary.read(context.codegen(), stored)
+        if library is None:
+            return None
+        compiled = compile_result(
+            library=library,
+            fndesc=descriptor,
+            environment=environment,
+            signature=result,
+            objectmode=False,
+            entry_point=object(),
+        )
+        self.name(signature, compiled)
+        return compiled
+
+
+def _is_found(library: Any) -> bool:
+    """Whether another process finds a library that a piece links; functions of Numba's own are written with it."""
+    if isinstance(library, PieceLibrary):
+        return library.named is not None
+    return getattr(library, "kept", True) if isinstance(library, Named) else True
