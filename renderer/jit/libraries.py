@@ -61,7 +61,7 @@ class PieceLibrary(JITCodeLibrary):  # type: ignore[misc]
             module = self._final_module.clone()
             _link_all(module, self._linking_libraries)
             for function in module.functions:
-                if not function.is_declaration:
+                if not function.is_declaration and function.linkage != llvm.Linkage.private:
                     function.linkage = "linkonce_odr"
             self._merged = module
         return self._merged

@@ -60,11 +60,12 @@ def test_each_is_compiled_once_and_read_with_its_callers(package):
     assert run(package, RUN) == ["40", "54", "1", "1", "1", "1"]
 
 
-def test_it_follows_the_sources_of_kernels_and_classes_that_it_gets(package):
+@pytest.mark.parametrize("how", ["apart", "kernel"])
+def test_it_follows_the_sources_of_kernels_and_classes_that_it_gets(package, how):
     """Which its own file does not import: their sources decide what it does all the same."""
-    far = """
-from renderer.jit.decorators import apart
-@apart
+    far = f"""
+from renderer.jit.decorators import {how}
+@{how}
 def deep(x, step, place):
     return step(x) + place.x
 """

@@ -1,0 +1,116 @@
+"""Pieces on disk: what another process typed and lowered is read, unless something that decides it has changed."""
+
+import pytest
+from kernel_package import run, start, write_package
+
+BELOW = """
+from renderer.jit.decorators import kernel
+from renderer.below.deep.bottom import STEP
+@kernel
+def cubed(x):
+    return x ** 3 + STEP
+@kernel
+def doubled(x):
+    return 2 * cubed(x)
+"""
+CALLERS = """
+from renderer.jit.decorators import kernel
+from renderer.under import cubed, doubled
+@kernel
+def fourth(x):
+    return x ** 3 * x
+@kernel
+def first(x):
+    return doubled(x) + 1
+@kernel
+def second(x):
+    return doubled(x) + fourth(x)
+"""
+# Prints the answer, and for each function how often it was typed and lowered.
+RUN = """
+from renderer.callers import {name}
+from renderer.under import cubed, doubled
+print({name}(3), *(sum(one.piece.stats.cache_misses.values()) for one in (doubled, cubed)))
+"""
+FIRST, SECOND = RUN.format(name="first"), RUN.format(name="second")
+
+
+@pytest.fixture
+def package(tmp_path):
+    folder = write_package(tmp_path)
+    (folder / "under.py").write_text(BELOW)
+    (folder / "callers.py").write_text(CALLERS)
+    return folder
+
+
+def pieces(package):
+    return sorted((package / "__pycache__").glob("*.piece"))
+
+
+def test_another_kernel_that_contains_them_reads_them(package):
+    """Numba's own function for a power is in one of them, and another is compiled beside it."""
+    assert run(package, FIRST) == ["75", "1", "1"]
+    assert run(package, SECOND) == ["155", "0", "0"]
+
+
+def test_an_edit_below_them_shows(package):
+    assert run(package, FIRST) == ["75", "1", "1"]
+    before = {path for path in pieces(package) if "under" in path.name}
+    (package / "below" / "deep" / "bottom.py").write_text("STEP = 20\n")
+    assert run(package, SECOND) == ["175", "1", "1"]
+    after = {path for path in pieces(package) if "under" in path.name}
+    assert len(after) == len(before) == 2 and not before & after
+
+
+def test_a_damaged_one_is_said_once_and_made_anew(package):
+    assert run(package, FIRST) == ["75", "1", "1"]
+    for path in pieces(package):
+        path.write_bytes(path.read_bytes()[:-1])
+    done = start(package, SECOND)
+    assert done.stdout.split() == ["155", "1", "1"]
+    assert done.stderr.count("is damaged") == 1
+
+
+def test_one_in_another_package_does_not_contain_what_was_edited(package):
+    """Its file stays, as it follows only its own source and ours; what it contains has another symbol now."""
+    mine = "from renderer.jit.decorators import kernel\nfrom theirs import deep\n"
+    theirs = "from renderer.jit.decorators import kernel\n@kernel\ndef deep(x): return x + 5\n"
+    (package.parent / "theirs.py").write_text(theirs)
+    (package.parent / "mine.py").write_text(mine + "@kernel\ndef middle(x): return 2 * deep(x)\n")
+    for name in ("one", "two"):
+        caller = mine.replace("theirs", "mine").replace("deep", "middle")
+        (package.parent / f"{name}.py").write_text(f"{caller}@kernel\ndef top(x): return middle(x)\n")
+    assert run(package, "from one import top; print(top(3))") == ["16"]
+    (package.parent / "theirs.py").write_text(theirs.replace("+ 5", "+ 50"))
+    done = start(package, "from two import top; print(top(3))")
+    assert done.stdout.split() == ["106"] and "is damaged" not in done.stderr
+
+
+def test_one_that_contains_a_nested_kernel_is_not_kept(package):
+    """Two nested kernels may have one name, so no other process could know which it is."""
+    (package / "under.py").write_text("""
+from renderer.jit.decorators import kernel
+def made(step):
+    @kernel
+    def nested(x):
+        return x + step
+    return nested
+nested = made(4)
+@kernel
+def cubed(x):
+    return nested(x)
+@kernel
+def doubled(x):
+    return 2 * cubed(x)
+""")
+    assert run(package, FIRST) == ["15", "1", "1"]
+    assert [path.name.split("-")[0] for path in pieces(package)] == []
+    assert run(package, SECOND) == ["95", "1", "1"]
+
+
+def test_a_folder_that_is_carried_away_gets_none(package, tmp_path):
+    folder = tmp_path / "carried"
+    folder.mkdir()
+    chosen = f"from pathlib import Path\nfrom renderer.jit.cache import keep_in\nkeep_in(Path({str(folder)!r}))\n"
+    assert run(package, chosen + FIRST) == ["75", "1", "1"]
+    assert len(list(folder.iterdir())) == 1 + (folder / "compiling.lock").exists()
