@@ -70,31 +70,25 @@ def deep(x, step, place):
     return step(x) + place.x
 """
     (package / "far.py").write_text(far)
-    step = """
-from typing import Any, NamedTuple
-from renderer.jit.decorators import inlined
-class Place(NamedTuple):
-    x: Any
-    y: Any
-@inlined
-def step(x):
-    return 10 * x
-"""
+    place = "from typing import Any, NamedTuple\nclass Place(NamedTuple):\n    x: Any\n    y: Any\n"
+    step = "from renderer.jit.decorators import inlined\n@inlined\ndef step(x): return 10 * x\n"
+    (package / "place.py").write_text(place)
     (package / "step.py").write_text(step)
     (package / "callers.py").write_text("""
 from renderer.jit.decorators import kernel
 from renderer.far import deep
-from renderer.step import Place, step
+from renderer.place import Place
+from renderer.step import step
 @kernel
 def first(x):
     return deep(x, step, Place(x=1, y=2))
 """)
     program = "from renderer.callers import first; print(first(3))"
     assert run(package, program) == ["31"]
+    (package / "place.py").write_text(place.replace("    x: Any\n    y: Any\n", "    y: Any\n    x: Any\n"))
+    assert run(package, program) == ["31"]
     (package / "step.py").write_text(step.replace("10 * x", "20 * x"))
     assert run(package, program) == ["61"]
-    (package / "step.py").write_text(step.replace("    x: Any\n    y: Any\n", "    y: Any\n    x: Any\n"))
-    assert run(package, program) == ["31"]
 
 
 def test_a_caller_of_one_that_is_not_kept_is_not_kept(package):

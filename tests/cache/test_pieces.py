@@ -24,7 +24,7 @@ def first(x):
     return doubled(x) + 1
 @kernel
 def second(x):
-    return doubled(x) + fourth(x)
+    return fourth(x) + doubled(x)
 """
 # Prints the answer, and for each function how often it was typed and lowered.
 RUN = """
@@ -48,9 +48,18 @@ def pieces(package):
 
 
 def test_another_kernel_that_contains_them_reads_them(package):
-    """Numba's own function for a power is in one of them, and another is compiled beside it."""
+    """Others are compiled before them, and Numba's own function for a power again."""
     assert run(package, FIRST) == ["75", "1", "1"]
     assert run(package, SECOND) == ["155", "0", "0"]
+
+
+def test_one_fits_what_it_contains_also_if_that_is_made_anew(package):
+    """As by two processes at once: its name is the same in each."""
+    assert run(package, FIRST) == ["75", "1", "1"]
+    for path in pieces(package):
+        if "cubed" in path.name:
+            path.unlink()
+    assert run(package, SECOND) == ["155", "0", "1"]
 
 
 def test_an_edit_below_them_shows(package):
