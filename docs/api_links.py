@@ -21,7 +21,7 @@ def link_api(app, doctree, page):
 
 
 def _targets(objects):
-    """What the names stand for: whole ones, and ends of them that one object has, or Octree and others."""
+    """The objects of the names: whole ones, and ends of them that one object has, or Octree and others."""
     found = defaultdict(set)
     for name, entry in objects.items():
         words = name.split(".")

@@ -1,4 +1,4 @@
-"""How Sphinx draws the site: ``make docs``. Its pages are this folder's, the README and those beside it.
+"""Sphinx's settings for the site: ``make docs``. Its pages are this folder's, the README and those beside it.
 
 Nothing is fetched. Scripts of the gallery and notebooks are run. Sources are read from the root of the repository, so
 that links between pages are those that a code host follows, too.

@@ -64,7 +64,7 @@ def table(head: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
 
 
 def runs(record: Record) -> str:
-    """Where the figures come from."""
+    """The origin of the figures."""
     rows = [(f"`{run['command']}`", run["machine"], run["commit"], run["date"], _or_dash(run["seconds"], 60, ".0f"),
              _or_dash(run["load"], 1, ".2f")) for run in record.values()]  # fmt: skip
     return table(("command", "machine", "commit", "date", "minutes", "load before"), rows)
@@ -187,7 +187,7 @@ def rewritten(text: str, record: Record) -> str:
 
 
 def written(record: Record) -> dict[Path, str]:
-    """What each file is to have."""
+    """The content that each file is to have."""
     return {page: rewritten(page.read_text(encoding="utf-8"), record) for page in PAGES} | {CHART: chart(record)}
 
 

@@ -1,4 +1,4 @@
-"""What the modules that make links of words in the text have in common."""
+"""The common part of the modules that make links of words in the text."""
 
 from docutils import nodes
 

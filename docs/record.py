@@ -1,4 +1,4 @@
-"""What the pages take from a run: ``docs/figures.json``, distilled from ``metrics.json`` and ``benchmark.json``."""
+"""The figures that the pages take from a run: ``docs/figures.json``, of ``metrics.json`` and ``benchmark.json``."""
 
 import json
 from collections import Counter
@@ -83,7 +83,7 @@ def _query(row: Record) -> Record:
 
 
 def _origin(run: Record, started: str, command: str) -> Record:
-    """Where the figures come from; the commit where the sources are still those that ran."""
+    """The origin of the figures; the commit where the sources are still those that ran."""
     around = run["environment"]
     known = run.get("commit") or (commit() if around["sources"] == sources_sha256() else None)
     limit = ", ours limited to it" if around.get("limited") else ""

@@ -1,4 +1,4 @@
-"""How boxes of the octree are cut; without NumPy, as the command line shows it."""
+"""The ways to cut boxes of the octree; without NumPy, as the command line shows it."""
 
 from typing import Literal
 

@@ -122,7 +122,7 @@ class Parts:
         return values
 
     def count(self, value: float) -> int:
-        """How many values of the result equal this one."""
+        """The number of values of the result that equal this one."""
         return sum(int(np.count_nonzero(self.read(part) == value)) for part in range(self.plan.parts))
 
     def remove(self) -> None:

@@ -31,7 +31,7 @@ PART = 1 << 15
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """What is computed for each of many points, as a record that can be stored, sent and repeated.
+    """A quantity computed for each of many points, as a record that can be stored, sent and repeated.
 
     Parameters
     ----------

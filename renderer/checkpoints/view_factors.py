@@ -157,7 +157,7 @@ def folder_for(tracing: Tracing, folder: Path) -> RunFolder:
 
 
 def _of_rows(known: Known, rows: Integers) -> Known:
-    """What is known of some rows, as rows that follow each other."""
+    """The known part of some rows, as rows that follow each other."""
     lengths = np.diff(known.first)[rows]
     first = firsts_of(lengths)
     entries = np.arange(first[-1]) + np.repeat(known.first[rows] - first[:-1], lengths)

@@ -80,7 +80,7 @@ class SentStudy(NamedTuple):
 
 
 def kept(key: str, make: Callable[[], Any]) -> Any:
-    """What this process has under a key, or makes now while other threads wait; ``make`` must not call this."""
+    """The value that this process has under a key, or makes while other threads wait; ``make`` must not call this."""
     with _LOCK:
         if key not in _TREES:
             while len(_TREES) >= _MOST:

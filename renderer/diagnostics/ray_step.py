@@ -239,7 +239,7 @@ class Steps:
         return not self.arrays.holes or bool(is_there_of(self.arrays, spot))
 
     def _seen(self, spot: Spot, surface: Surface, d: Vector, width: float) -> Seen:
-        """What a ray of direction d and that ``width`` sees of a surface."""
+        """The part of a surface that a ray of direction d and that ``width`` sees."""
         if not len(self.arrays.maps):
             return Seen(self.arrays, int(surface.material), surface.n_s, (0.0, 0.0, 0.0))
         own = np.empty(OWN_COLUMNS)
@@ -263,7 +263,7 @@ def steps_of(prepared: PreparedScene, offset: OffsetRule = BOUNDED, media: Media
 
 
 def _spot_of(hits: Hits) -> Spot:
-    """Where the first ray of ``hits`` hits."""
+    """The point where the first ray of ``hits`` hits."""
     return Spot(int(hits.face[0]), float(hits.u[0]), float(hits.v[0]))
 
 

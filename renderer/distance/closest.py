@@ -28,7 +28,7 @@ _LEAST = 1024
 
 
 class Counted(NamedTuple):
-    """What counts in a scene: the ``mask`` of ``find_nearest``, and the numbers and corners of the faces."""
+    """The part of a scene that counts: the ``mask`` of ``find_nearest``, and the numbers and corners of the faces."""
 
     mask: int
     faces: Callable[[], tuple[NDArray[np.int64], NDArray[np.float64]]]

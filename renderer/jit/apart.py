@@ -1,4 +1,4 @@
-"""How a kernel calls another whose machine code is apart: by a symbol, which this process knows before it needs it."""
+"""Calls of a kernel whose machine code is apart: by a symbol, which this process knows before it needs it."""
 
 import copy
 import hashlib
@@ -16,7 +16,7 @@ from renderer.jit.libraries import Named
 
 @dataclass(frozen=True)
 class Reference(Named):
-    """What a caller links in place of an apart kernel: nothing. Called before the caller is loaded from disk.
+    """The empty library that a caller links in place of an apart kernel. Called before the caller is loaded from disk.
 
     ``kept`` says whether another process finds the same kernel there.
     """
@@ -37,7 +37,7 @@ class Reference(Named):
 
     @property
     def _reload_init(self) -> set["Reference"]:
-        """What Numba calls before it loads a function that links this one."""
+        """The functions that Numba calls before it loads one that links this."""
         return {self}
 
     def _ensure_finalized(self) -> None:

@@ -146,7 +146,7 @@ def _library_of(piece: Any, state: Any) -> EntryLibrary:
 
 
 def _entry_of(piece: Any, state: Any) -> CompileResult:
-    """What Python calls of a piece."""
+    """The function that Python calls of a piece."""
     context, library = state.targetctx, _library_of(piece, state)
     context.create_cpython_wrapper(library, piece.fndesc, piece.environment, piece.call_helper, state.flags.release_gil)
     function = context.get_executable(library, piece.fndesc, piece.environment)
@@ -154,7 +154,7 @@ def _entry_of(piece: Any, state: Any) -> CompileResult:
 
 
 def _apart_of(piece: Any, state: Any, symbol: str) -> CompileResult:
-    """What kernels call of a piece that they do not contain."""
+    """The function that kernels call of a piece that they do not contain."""
     library = _library_of(piece, state)
     descriptor = write_symbol(library, state.targetctx, piece, symbol)
     library.finalize()

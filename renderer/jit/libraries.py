@@ -79,7 +79,7 @@ class PieceLibrary(JITCodeLibrary):  # type: ignore[misc]
 
     @classmethod
     def read(cls, codegen: Any, stored: Any) -> "PieceLibrary | None":
-        """What ``serialize_using_object_code`` wrote; None if a piece that it links has changed."""
+        """A library that ``serialize_using_object_code`` wrote; None if a piece that it links has changed."""
         name, bitcode, linked = stored
         self = cls(codegen, name)
         self._final_module = llvm.parse_bitcode(bitcode)

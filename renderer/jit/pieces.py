@@ -19,7 +19,7 @@ class PieceStore(CalledStore):
     suffix = ".piece"
 
     def unique(self, signature: Any, context: Any) -> str | None:
-        """What distinguishes its names from those of any other piece in any process; None if no file can stand for it.
+        """A text by which its names differ from those of other pieces in any process; None if no file can stand for it.
 
         Numba's own number is that of one process.
         """

@@ -1,1 +1,1 @@
-"""What surfaces are made of: the fields of each material, its row for the kernels, and its shading."""
+"""The materials of surfaces: the fields of each material, its row for the kernels, and its shading."""

@@ -1,4 +1,4 @@
-"""What pictures make of a material, whatever it is."""
+"""The appearance of any material in pictures."""
 
 from collections.abc import Mapping
 from types import MappingProxyType

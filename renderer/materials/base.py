@@ -1,4 +1,4 @@
-"""What all materials have."""
+"""The common base of all materials."""
 
 from __future__ import annotations
 
@@ -73,5 +73,5 @@ class BaseMaterial(Fields):
 
 
 def appearance_of(material: BaseMaterial) -> Appearance:
-    """What pictures make of a material."""
+    """A material's appearance in pictures."""
     return material._appearance()

@@ -64,7 +64,7 @@ class Dielectric(BaseMaterial):
     ) -> None: ...
 
     def _appearance(self) -> Appearance:
-        """What pictures make of it."""
+        """Its appearance in pictures."""
         return Appearance(CLEAR, reflectance=self.reflectance, transmittance=self.transmittance, ior=self.ior)
 
 

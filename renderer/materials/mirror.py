@@ -43,5 +43,5 @@ class Mirror(BaseMaterial):
     def __init__(self, *, reflectance: ArrayLike = 1.0, type: Literal["mirror"] = "mirror") -> None: ...
 
     def _appearance(self) -> Appearance:
-        """What pictures make of it."""
+        """Its appearance in pictures."""
         return Appearance(UNLIT, reflectance=self.reflectance)

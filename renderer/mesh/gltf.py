@@ -197,7 +197,7 @@ def _buffer(number: int, buffer: dict[str, Any], binary: bytes | None, folder: P
 
 
 def _shown(document: dict[str, Any], accessors: Accessors, materials: Materials, reading: Reading) -> Iterator[_Shown]:
-    """What each node with a mesh shows, in their order."""
+    """The mesh that each node with one shows, in their order."""
     nodes = Nodes(document, accessors)
     known: dict[tuple[Any, ...], list[Mesh]] = {}
     for number, node in nodes.with_meshes():

@@ -1,4 +1,4 @@
-"""What generators get wrong, mended on request: corners at one place that are several vertices, and faces twice."""
+"""Mends common faults of generators, on request: corners at one place that are several vertices, and faces twice."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a mesh file is read, and what is left out of it on the way."""
+"""The settings for reading a mesh file, and what is left out of it on the way."""
 
 from __future__ import annotations
 

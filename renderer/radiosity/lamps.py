@@ -60,7 +60,7 @@ def _light_of(octree: Queries, light: Light, faces: Ints, normals: Floats, corne
 
 
 def _falloff(towards: Floats) -> Floats:
-    """What the dot product of a normal and the way to a point light becomes light by: 1 / r^3; 0 at the light."""
+    """The factor from the dot product of a normal and the way to a point light to light: 1 / r^3; 0 at the light."""
     squares = np.einsum("npc,npc->np", towards, towards)
     # rule: patch-inverse-square
     return np.divide(1.0, squares * np.sqrt(squares), out=np.zeros_like(squares), where=squares > 0.0)

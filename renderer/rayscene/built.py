@@ -353,7 +353,7 @@ class BuiltScene:
         return corners
 
     def counted(self, mask: int | None) -> Counted:
-        """What is shown and, with a mask, has a bit of it, as ``closest_point`` takes it."""
+        """The instances that are shown and, with a mask, have a bit of it, as ``closest_point`` takes them."""
 
         def faces() -> tuple[NDArray[np.int64], NDArray[np.float64]]:
             flags = self.top.instances.view(np.int64)[:, FLAGS]

@@ -37,7 +37,7 @@ _MOST = 2**32 - 1
 
 
 class StoredScene(NamedTuple):
-    """What a file keeps of a scene: the scene at one moment, and the number that the next object gets."""
+    """The content of a scene's file: the scene at one moment, and the number that the next object gets."""
 
     built: BuiltScene
     next: int

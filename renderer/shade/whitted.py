@@ -288,7 +288,7 @@ def refract_from(arrays, m, d, n, n1, n2):
 
 
 class _Exit(NamedTuple):
-    """Where spawned rays leave a surface: the point, its ``offset_distance``, the normal and the ``Place``."""
+    """The place where rays leave a surface: the point, its ``offset_distance``, the normal and the ``Place``."""
 
     p: tuple
     error: float

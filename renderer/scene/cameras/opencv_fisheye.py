@@ -130,7 +130,7 @@ class OpenCVFisheyeCamera(CalibratedCamera, AngularCamera):
         return np.where(unseen, np.nan, x), np.where(unseen, np.nan, y)
 
     def _distance(self, angle: Floats) -> tuple[Floats, Floats]:
-        """How far from the principal point a ray at an angle falls, in focal lengths, and its derivative."""
+        """The distance from the principal point where a ray at an angle falls, in focal lengths, and its derivative."""
         square = angle * angle
         # rule: fisheye-distortion
         powers = (1.0, self.k1, self.k2, self.k3, self.k4)

@@ -91,7 +91,7 @@ def warn_of_backs(backs: Floats) -> None:
 
 
 def backs_message(backs: Floats, names: Sequence[object], remedy: str) -> str:
-    """What is said of rows that see backs, by their names; empty if there are none."""
+    """A warning of rows that see backs, by their names; empty if there are none."""
     seen = np.count_nonzero(backs)
     if not seen:
         return ""

@@ -17,7 +17,7 @@ Flags = NDArray[np.bool_]
 
 
 class Work(Protocol):
-    """Who does the work: this process at once, or part by part. The bits are the same."""
+    """The worker: this process at once, or part by part. The bits are the same."""
 
     def rows(self, name: str, tracing: Tracing, rows: Integers, known: Known) -> RowHits:
         """As ``trace_rows``; ``name`` is that of this step of the computation."""
