@@ -12,7 +12,8 @@ import pytest
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="sends signals")
 ROOT = Path(__file__).parents[2]
 
-# A command that is writing a file when the signal comes.
+# A command that is writing a file when the signal comes. It sleeps in short steps: Python would see a signal that comes
+# just before a sleep at its end.
 SCRIPT = """
 import sys, time
 from renderer.system.files import write_atomically
@@ -24,7 +25,7 @@ def main(arguments=None):
         file.write(b"half")
         file.flush()
         print("writing", flush=True)
-        time.sleep(60)
+        for _ in range(600): time.sleep(0.1)
     write_atomically("out.bin", write)
     return 0
 
@@ -54,9 +55,8 @@ def test_no_temporary_file_stays(tmp_path, number):
 
 def test_a_command_that_takes_it_for_ctrl_c_and_ends_well_ends_by_the_signal_too(tmp_path):
     """As view does, for whom Ctrl-C is the usual way to end."""
-    script = SCRIPT.replace(
-        "        time.sleep(60)\n", "        try: time.sleep(60)\n        except KeyboardInterrupt: pass\n"
-    )
+    wait = "        for _ in range(600): time.sleep(0.1)\n"
+    script = SCRIPT.replace(wait, f"        try:\n    {wait}        except KeyboardInterrupt: pass\n")
     with started(tmp_path, script=script) as running:
         assert running.stdout.readline() == "writing\n"
         running.send_signal(signal.SIGTERM)
