@@ -36,7 +36,7 @@ from renderer.system.files import write_atomically
 _CARRIED = PACKAGE / "compiled"
 _SUFFIX = ".kernel"
 _HEADER = b"octree-renderer kernel 1\n"
-# To be changed when older machine code is no longer right, for a reason that no digest of kernels' sources shows.
+# To be changed when older files are no longer right, for a reason that no digest of kernels' sources shows.
 _FORM = "private pieces"
 
 
