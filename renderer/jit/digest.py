@@ -19,26 +19,45 @@ def is_ours(path: Path) -> bool:
     return path.resolve().is_relative_to(PACKAGE)
 
 
-@cache
 def source_digest(path: Path) -> str | None:
     """Hex digest of a source file and of all files of this package that it imports, at any depth.
 
     For a file outside the package: of that file and the whole package. None, logged once, if the file cannot be read,
     as in a zip, or if a file was written after this process loaded the package: the code that runs may then differ from
-    it.
+    it. The file itself may also be written, and its module loaded again, after its digest was first needed.
     """
+    return None if _is_new(path) else _digest(path)
+
+
+@cache
+def _digest(path: Path) -> str | None:
     path = path.resolve()
     seen = reached([path] if is_ours(path) else [path, *PACKAGE.rglob("*.py")])
-    newer = sorted(found for found in seen if found.stat().st_mtime > loaded.AT)
-    if path not in seen or newer:
-        why = f"{newer[0]} was written after this process began" if newer else f"{path} cannot be read"
-        warn_once("sources", f"renderer: compiled kernels are neither kept nor looked for: {why}")
+    if path not in seen:
+        _refuse(f"{path} cannot be read")
+        return None
+    if any(_is_new(found) for found in sorted(seen)):
         return None
     digest = hashlib.sha256()
     for found in sorted(seen):
         name = found.relative_to(PACKAGE).as_posix() if found.is_relative_to(PACKAGE) else found.name
         digest.update(name.encode() + b"\0" + _source(found) + b"\0")
     return digest.hexdigest()
+
+
+def _is_new(path: Path) -> bool:
+    """Whether a file was written after this process loaded the package; logged once."""
+    try:
+        is_new = path.stat().st_mtime > loaded.AT
+    except OSError:
+        return False
+    if is_new:
+        _refuse(f"{path} was written after this process began")
+    return is_new
+
+
+def _refuse(why: str) -> None:
+    warn_once("sources", f"renderer: compiled kernels are neither kept nor looked for: {why}")
 
 
 def reached(files: Iterable[Path]) -> set[Path]:

@@ -48,6 +48,9 @@ class PieceLibrary(JITCodeLibrary):  # type: ignore[misc]
                 passes, builder = self._codegen._function_pass_manager()
                 passes.run(function, builder)
         self._finalize_dynamic_globals()
+        for library in self._numbas():
+            # Addresses of this process, which are written with the piece.
+            self._dynamic_globals += library._dynamic_globals
         self._inherit()
 
     def _inherit(self) -> None:
@@ -70,12 +73,15 @@ class PieceLibrary(JITCodeLibrary):  # type: ignore[misc]
         """The module with what it contains of Numba's own, and what else it links: names of pieces, and references."""
         named = [library.named for library in self._linking_libraries if isinstance(library, PieceLibrary)]
         apart = [library for library in self._linking_libraries if isinstance(library, Named)]
-        numbas = [library for library in self._linking_libraries if not isinstance(library, PieceLibrary | Named)]
         module = self._final_module
-        if numbas:
+        if self._numbas():
             module = module.clone()
-            _link_privately(module, numbas)
+            _link_privately(module, self._numbas())
         return (self.name, module.as_bitcode(), (*named, *apart))
+
+    def _numbas(self) -> list[Any]:
+        """The functions of Numba's own that this links."""
+        return [library for library in self._linking_libraries if not isinstance(library, PieceLibrary | Named)]
 
     @classmethod
     def read(cls, codegen: Any, stored: Any) -> "PieceLibrary | None":

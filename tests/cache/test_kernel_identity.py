@@ -137,3 +137,16 @@ def test_numba_without_its_compiler_is_said_in_one_line(package):
     script = "try:\n    import renderer.upper\nexcept ImportError as error:\n    print(error)"
     said = " ".join(run(package, script, NUMBA_DISABLE_JIT="1"))
     assert said == "renderer: NUMBA_DISABLE_JIT is set, but kernels run only compiled: unset it"
+
+
+def test_a_module_that_is_edited_and_loaded_again_runs_as_it_is_now(package):
+    """Its file's digest was that of the first text for the rest of the process."""
+    text = "from renderer.jit.decorators import kernel\n@kernel\ndef top(x): return x + 5\n"
+    (package.parent / "own.py").write_text(text)
+    script = f"""
+import importlib, own
+print(own.top(3))
+open(own.__file__, "w").write({text.replace("+ 5", "+ 500")!r})
+print(importlib.reload(own).top(3))
+"""
+    assert run(package, script) == ["8", "503"]

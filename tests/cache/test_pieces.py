@@ -53,6 +53,21 @@ def test_another_kernel_that_contains_them_reads_them(package):
     assert run(package, SECOND) == ["155", "0", "0"]
 
 
+def test_machine_code_of_what_was_read_is_that_of_what_was_made(package, tmp_path):
+    """If it contains no function of Numba's own, of which each piece brings its copy."""
+    for source in (package / "under.py", package / "callers.py"):
+        source.write_text(source.read_text().replace("x ** 3", "x * x * x"))
+    code = """
+(compiled,) = second.entry.overloads.values()
+print(compiled.library._get_compiled_object().hex())
+"""
+    assert run(package, FIRST) == ["75", "1", "1"]
+    *answer, read = run(package, SECOND + code)
+    *alone, made = run(package, SECOND + code, NUMBA_CACHE_DIR=str(tmp_path / "empty"))
+    assert (answer, alone) == (["155", "0", "0"], ["155", "1", "1"])
+    assert read == made
+
+
 def test_one_fits_what_it_contains_also_if_that_is_made_anew(package):
     """As by two processes at once: its name is the same in each."""
     assert run(package, FIRST) == ["75", "1", "1"]
