@@ -69,9 +69,6 @@ class _LowerPiece(NativeLowering):  # type: ignore[misc]
     _name = "renderer_lower_piece"
 
     def run_pass(self, state: Any) -> bool:
-        unique = _kernels[state.func_id.func].piece_store.unique(state.args, state.targetctx)
-        if unique is not None:
-            state.func_id.unique_id = state.func_ir.func_id.unique_id = unique
         state.library = PieceLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         state.flags.no_cpython_wrapper = True
@@ -195,6 +192,13 @@ _PIECE_PASSES = (
 
 
 class _PieceCompiler(CompilerBase):  # type: ignore[misc]
+    def _compile_bytecode(self) -> Any:
+        state = self.state
+        unique = _kernels[state.func_id.func].piece_store.unique(state.args, state.targetctx)
+        if unique is not None:
+            state.func_id.unique_id = unique
+        return super()._compile_bytecode()
+
     def define_pipelines(self) -> list[PassManager]:
         return [_pipeline("piece", _PIECE_PASSES)]
 

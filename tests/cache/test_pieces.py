@@ -77,6 +77,13 @@ def test_one_fits_what_it_contains_also_if_that_is_made_anew(package):
     assert run(package, SECOND) == ["155", "0", "1"]
 
 
+def test_one_that_calls_itself_is_read_too(package):
+    text = (package / "under.py").read_text()
+    (package / "under.py").write_text(text.replace("return 2 * cubed(x)", "return x if x < 2 else doubled(x - 1) + 5"))
+    assert run(package, FIRST) == ["12", "1", "0"]
+    assert run(package, SECOND) == ["92", "0", "0"]
+
+
 def test_an_edit_below_them_shows(package):
     assert run(package, FIRST) == ["75", "1", "1"]
     before = {path for path in pieces(package) if "under" in path.name}
