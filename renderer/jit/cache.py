@@ -141,9 +141,10 @@ class KernelStore:
         except OSError as error:
             warn_once("unwritable", f"compiled kernels cannot be kept: {path}: {error.strerror}")
             return False
-        current = f"{self._prefix()}{_of_sources(key[1])}"
+        prefix = self._prefix()
+        current = f"{prefix}{_of_sources(key[1])}"
         for name in self._names(folder):
-            if name.startswith(self._prefix()) and not name.startswith(current):
+            if name.startswith(prefix) and not name.startswith(current):
                 with suppress(OSError):
                     (folder / name).unlink()
         return True

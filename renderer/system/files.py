@@ -17,6 +17,7 @@ except ImportError:  # on Windows
 
 # The last letters of a temporary file's name.
 _RANDOM = 12
+_END = re.compile(f"[0-9a-f]{{{_RANDOM}}}")
 
 
 def as_path(argument: str, value: object) -> Path:
@@ -122,11 +123,12 @@ def _remove_left(target: Path) -> None:
     """Remove the temporary files of ``target`` whose writers are gone: those without a lock."""
     if fcntl is None:
         return
-    name = re.compile(f"{re.escape(_beginning(target))}[0-9a-f]{{{_RANDOM}}}")
+    beginning = _beginning(target)
     with suppress(OSError):
-        for found in filter(name.fullmatch, os.listdir(target.parent)):
-            with suppress(OSError):
-                _remove_unlocked(target.with_name(found))
+        for found in os.listdir(target.parent):
+            if found.startswith(beginning) and _END.fullmatch(found, len(beginning)):
+                with suppress(OSError):
+                    _remove_unlocked(target.with_name(found))
 
 
 def _remove_unlocked(path: Path) -> None:
