@@ -259,6 +259,7 @@ KINDS = {"query": Kind(make_query, check_query, share=10)}
 
 def prepare_kinds() -> None:
     """Compile the kernels before a clock starts."""
+    Octree.from_mesh(box(), threads=1, split="midpoint")
     for accelerator in (Octree.from_mesh(box(), threads=1), BruteForce.from_mesh(box())):
         for count in (1, 40):
             origins, directions = np.tile(box().triangles[0, 0], (count, 1)), np.ones((count, 3))
