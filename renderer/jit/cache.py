@@ -167,7 +167,14 @@ class KernelStore:
         return _names(folder, self.suffix)
 
     def _key(self, signature: Any, machine: tuple[str, ...]) -> tuple[str, ...]:
-        return (str(signature), str(self._digest), _versions(), *machine, f"svml {config.USING_SVML}")
+        return (
+            str(signature),
+            str(self._digest),
+            _versions(),
+            *machine,
+            f"svml {config.USING_SVML}",
+            f"bounds {config.BOUNDSCHECK}",
+        )
 
     def _prefix(self) -> str:
         short = hashlib.sha256(_versions().encode()).hexdigest()[:8]

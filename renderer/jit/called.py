@@ -36,7 +36,10 @@ def _digests(signature: Any) -> set[str | None]:
         if isinstance(one, types.Dispatcher):
             digests.add(digest_of(one.dispatcher.py_func))
         if isinstance(one, types.BaseNamedTuple):
-            digests.add(source_digest(Path(str(sys.modules[one.instance_class.__module__].__file__))))
+            made = one.instance_class
+            # Two classes of one name have types of one text.
+            source = source_digest(Path(str(sys.modules[made.__module__].__file__)))
+            digests.add(source and f"{source} {made.__module__}.{made.__qualname__} {made._fields}")
         if isinstance(one, types.BaseTuple):
             pending += one
     return digests

@@ -6,10 +6,12 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from numba.core import types
 from numba.core.compiler import CompileResult, compile_result
 
 from renderer.jit.cache import hash_of, is_chosen
 from renderer.jit.called import CalledStore
+from renderer.jit.digest import is_ours
 from renderer.jit.libraries import Contained, Named, PieceLibrary
 
 
@@ -17,6 +19,12 @@ class PieceStore(CalledStore):
     """The files of one function's pieces."""
 
     suffix = ".piece"
+
+    def knows(self, signature: Any) -> bool:
+        """Also that its sources are this package's, whose imports the digest follows, and that its types' text says all
+        of them.
+        """
+        return is_ours(self._source) and all(map(_is_plain, signature)) and super().knows(signature)
 
     def unique(self, signature: Any, context: Any) -> str | None:
         """A text by which its names differ from those of other pieces in any process; None if no file can stand for it.
@@ -57,6 +65,21 @@ class PieceStore(CalledStore):
         )
         self.name(signature, compiled)
         return compiled
+
+
+def _is_plain(one: Any) -> bool:
+    """Whether the text of a type, with the digests of kernels and classes in it, decides the type.
+
+    A module, a class or an enumeration as an argument would bring values of sources that no digest follows.
+    """
+    if isinstance(one, types.BaseTuple):
+        return all(map(_is_plain, one))
+    if isinstance(one, types.Array | types.CPointer):
+        return _is_plain(one.dtype)
+    if isinstance(one, types.Dispatcher):
+        return type(one).__module__ == "renderer.jit.compiler"
+    plain = types.Number | types.Boolean | types.NoneType | types.RawPointer
+    return isinstance(one, plain) or type(one).__module__ == "renderer.numerics.simd"
 
 
 def _is_found(library: Any) -> bool:

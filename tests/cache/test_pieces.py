@@ -102,19 +102,83 @@ def test_a_damaged_one_is_said_once_and_made_anew(package):
     assert done.stderr.count("is damaged") == 1
 
 
-def test_one_in_another_package_does_not_contain_what_was_edited(package):
-    """Its file stays, as it follows only its own source and ours; what it contains has another symbol now."""
-    mine = "from renderer.jit.decorators import kernel\nfrom theirs import deep\n"
-    theirs = "from renderer.jit.decorators import kernel\n@kernel\ndef deep(x): return x + 5\n"
-    (package.parent / "theirs.py").write_text(theirs)
-    (package.parent / "mine.py").write_text(mine + "@kernel\ndef middle(x): return 2 * deep(x)\n")
-    for name in ("one", "two"):
-        caller = mine.replace("theirs", "mine").replace("deep", "middle")
-        (package.parent / f"{name}.py").write_text(f"{caller}@kernel\ndef top(x): return middle(x)\n")
-    assert run(package, "from one import top; print(top(3))") == ["16"]
-    (package.parent / "theirs.py").write_text(theirs.replace("+ 5", "+ 50"))
-    done = start(package, "from two import top; print(top(3))")
-    assert done.stdout.split() == ["106"] and "is damaged" not in done.stderr
+def test_a_script_of_another_package_has_none_and_runs_once(package):
+    """To read one that was kept when the script was imported imported it again, and ran it twice."""
+    (package.parent / "script.py").write_text("""
+import sys
+from renderer.jit.decorators import kernel
+@kernel
+def inner(x): return x + 1
+@kernel
+def middle(x): return 2 * inner(x)
+@kernel
+def first(x): return middle(x)
+@kernel
+def second(x): return middle(x) + 1
+print(second(3) if __name__ == "__main__" else first(3))
+""")
+    assert run(package, "import script") == ["8"]
+    done = start(package, "import runpy; runpy.run_path('script.py', run_name='__main__')")
+    assert done.stdout.split() == ["9"] and "is damaged" not in done.stderr
+    assert not list(package.parent.glob("__pycache__/*.piece"))
+
+
+@pytest.mark.parametrize(
+    ("text", "call"),
+    [("S = 1\n", "kind, x"), ("import enum\nclass E(enum.Enum):\n    S = 1\n", "kind.E, x")],
+    ids=["module", "enumeration"],
+)
+def test_values_that_an_argument_brings_are_those_of_its_sources(package, text, call):
+    member = "m.S" if "class" not in text else "m.S.value"
+    (package / "kind.py").write_text(text)
+    (package / "under.py").write_text(
+        f"from renderer.jit.decorators import kernel\n@kernel\ndef deep(m, x): return x + {member}\n"
+    )
+    (package / "callers.py").write_text(
+        "from renderer.jit.decorators import kernel\nfrom renderer import kind\nfrom renderer.under import deep\n"
+        f"@kernel\ndef top(x): return deep({call})\n"
+    )
+    program = "from renderer.callers import top; print(top(10))"
+    assert run(package, program) == ["11"]
+    (package / "kind.py").write_text(text.replace("S = 1", "S = 5"))
+    assert run(package, program) == ["15"]
+
+
+def test_classes_of_one_name_in_one_module_are_two_types(package):
+    (package / "under.py").write_text("""
+from collections import namedtuple
+from renderer.jit.decorators import kernel
+A, B = namedtuple("P", "u v"), namedtuple("P", "v u")
+@kernel
+def cubed(p): return p.u - p.v
+@kernel
+def doubled(x): return cubed(A(x, 1)) + 100 * cubed(B(x, 1))
+""")
+    assert run(package, FIRST) == ["-197", "1", "2"]
+
+
+def test_code_that_checks_bounds_is_kept_apart(package):
+    (package / "under.py").write_text("""
+from renderer.jit.decorators import kernel
+@kernel
+def cubed(a): return a[3]
+@kernel
+def doubled(a): return cubed(a)
+""")
+    for name in ("first", "second"):
+        (package / f"{name}.py").write_text(
+            "from renderer.jit.decorators import kernel\nfrom renderer.under import doubled\n"
+            "@kernel\ndef top(a): return doubled(a)\n"
+        )
+    program = """
+import numpy as np
+from renderer.{name} import top
+try: print(top(np.arange(4)[:3]))
+except IndexError: print("refused")
+"""
+    assert run(package, program.format(name="first")) == ["3"]
+    for name in ("first", "second"):
+        assert run(package, program.format(name=name), NUMBA_BOUNDSCHECK="1") == ["refused"]
 
 
 def test_one_that_contains_a_nested_kernel_is_not_kept(package):
