@@ -37,8 +37,8 @@ print(answer(3), sum(answer.entry.stats.cache_hits.values()), sum(answer.entry.s
 COMPILED, LOADED = ["17", "0", "1"], ["17", "1", "0"]
 
 
-def write_package(parent: Path) -> Path:
-    """Write it as ``renderer`` into ``parent``; the constant is two folders down."""
+def write_package(parent: Path, **more: str) -> Path:
+    """Write it as ``renderer`` into ``parent``, and more modules by their names; the constant is two folders down."""
     folder = parent / "renderer"
     (folder / "below" / "deep").mkdir(parents=True)
     for source in (path for pattern in _NEEDED for path in PACKAGE.glob(pattern)):
@@ -47,8 +47,8 @@ def write_package(parent: Path) -> Path:
         shutil.copy(source, target)
     for package in (folder / "below", folder / "below" / "deep"):
         (package / "__init__.py").touch()
-    (folder / "upper.py").write_text(UPPER)
-    (folder / "middle.py").write_text(MIDDLE)
+    for name, text in {"upper": UPPER, "middle": MIDDLE, **more}.items():
+        (folder / f"{name}.py").write_text(text)
     for name in ("bottom", "aside"):
         (folder / "below" / "deep" / f"{name}.py").write_text("STEP = 10\n")
     return folder

@@ -3,7 +3,7 @@
 import copy
 import hashlib
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 from uuid import uuid4
 
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
@@ -22,18 +22,11 @@ class Reference(Named):
     """
 
     kept: bool
+    dispatcher: ClassVar[str] = "apart"
 
     def __call__(self) -> None:
-        if not self._is_current():
+        if self.linked() is None:
             raise RuntimeError(f"{self.module}.{self.name} has changed since its caller was compiled")
-
-    def linked(self) -> "Reference | None":
-        """This, once the kernel can be called; None if it has changed since."""
-        return self if self._is_current() else None
-
-    def _is_current(self) -> bool:
-        """Compile or load the kernel; whether it is the one that has the symbol."""
-        return bool(self.kernel().apart.compiled(self.arguments).fndesc.mangled_name == self.symbol)
 
     @property
     def _reload_init(self) -> set["Reference"]:

@@ -126,11 +126,12 @@ class KernelStore:
         """Nothing: ``keep`` was called before."""
 
     def keep(self, signature: Any, compiled: CompileResult) -> None:
-        """Write a kernel for other processes, and remove those compiled from other sources."""
-        if not self._is_written(signature, compiled):
+        """``write`` a kernel, or count it among the lost ones."""
+        if not self.write(signature, compiled):
             _Count.lost += 1
 
-    def _is_written(self, signature: Any, compiled: CompileResult) -> bool:
+    def write(self, signature: Any, compiled: CompileResult) -> bool:
+        """Write a kernel for other processes, and remove those compiled from other sources; whether it could."""
         folder = _folders(self._home).written
         if folder is None or not self.knows(signature) or compiled.library.has_dynamic_globals:
             return False

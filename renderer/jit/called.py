@@ -1,6 +1,7 @@
 """The files of kernels as other kernels call them: found by their names, and by the sources of what they get."""
 
 import sys
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +18,15 @@ class CalledStore(KernelStore):
         """Also that its callers find it by its name, and the sources of its arguments' types."""
         named = getattr(sys.modules.get(self._function.__module__), self._function.__qualname__, None)
         found = getattr(named, "py_func", None) is self._function
-        return found and super().knows(signature) and None not in _digests(signature)
+        return found and super().knows(signature) and None not in _digests(tuple(signature))
 
     def _key(self, signature: Any, machine: tuple[str, ...]) -> tuple[str, ...]:
         """With the sources of the kernels and classes among the arguments, which its own file need not import."""
-        return (*super()._key(signature, machine), *sorted(str(digest) for digest in _digests(signature)))
+        return (*super()._key(signature, machine), *sorted(str(digest) for digest in _digests(tuple(signature))))
 
 
-def _digests(signature: Any) -> set[str | None]:
+@cache
+def _digests(signature: tuple[Any, ...]) -> frozenset[str | None]:
     """The digests of the sources of kernels and of named tuples' classes among types, at any depth.
 
     None where one is unknown, as that of a nested kernel.
@@ -42,4 +44,4 @@ def _digests(signature: Any) -> set[str | None]:
             digests.add(source and f"{source} {made.__module__}.{made.__qualname__} {made._fields}")
         if isinstance(one, types.BaseTuple):
             pending += one
-    return digests
+    return frozenset(digests)

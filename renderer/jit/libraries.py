@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import Any, ClassVar
 
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
 from numba.core.codegen import JITCodeLibrary
@@ -22,10 +22,14 @@ class Named:
     name: str
     arguments: tuple[Any, ...]
     symbol: str
+    # The attribute of the kernel that is the dispatcher.
+    dispatcher: ClassVar[str] = "piece"
 
-    def kernel(self) -> Any:
-        """The kernel, for any types."""
-        return getattr(import_module(self.module), self.name)
+    def linked(self) -> Any:
+        """What its callers link, compiled or loaded if needed; None if the kernel has changed since."""
+        kernel = getattr(import_module(self.module), self.name)
+        compiled = getattr(kernel, self.dispatcher).compiled(self.arguments)
+        return compiled.library if compiled.fndesc.mangled_name == self.symbol else None
 
 
 class PieceLibrary(JITCodeLibrary):  # type: ignore[misc]
@@ -96,17 +100,6 @@ class PieceLibrary(JITCodeLibrary):  # type: ignore[misc]
             self._linking_libraries.append(found)
         self._inherit()
         return self
-
-
-@dataclass(frozen=True)
-class Contained(Named):
-    """A piece in the code of another."""
-
-    def linked(self) -> PieceLibrary | None:
-        """Its library, or None if it has changed since."""
-        compiled = self.kernel().piece.compiled(self.arguments)
-        found: PieceLibrary = compiled.library
-        return found if compiled.fndesc.mangled_name == self.symbol else None
 
 
 class EntryLibrary(JITCodeLibrary):  # type: ignore[misc]

@@ -12,7 +12,7 @@ from numba.core.compiler import CompileResult, compile_result
 from renderer.jit.cache import hash_of, is_chosen
 from renderer.jit.called import CalledStore
 from renderer.jit.digest import is_ours
-from renderer.jit.libraries import Contained, Named, PieceLibrary
+from renderer.jit.libraries import Named, PieceLibrary
 
 
 class PieceStore(CalledStore):
@@ -33,19 +33,19 @@ class PieceStore(CalledStore):
         """
         return hash_of(self._key(signature, context.codegen().magic_tuple())) if self.knows(signature) else None
 
-    def name(self, signature: Any, compiled: CompileResult) -> None:
+    def _give_name(self, signature: Any, compiled: CompileResult) -> None:
         """Give a piece the name by which other processes find it, if they would find all that it contains."""
         below = compiled.library._linking_libraries
         if self.knows(signature) and all(_is_found(library) for library in below):
             function = self._function
             place = function.__module__, function.__qualname__
-            compiled.library.named = Contained(*place, tuple(signature), compiled.fndesc.mangled_name)
+            compiled.library.named = Named(*place, tuple(signature), compiled.fndesc.mangled_name)
 
     def save_overload(self, signature: Any, compiled: CompileResult) -> None:
         """Write a piece for other processes, unless they would not find it, or write to a folder to be carried away."""
-        self.name(signature, compiled)
+        self._give_name(signature, compiled)
         if compiled.library.named is not None and not is_chosen():
-            self._is_written(signature, compiled)
+            self.write(signature, compiled)
 
     def _places(self, signature: Any, machine: tuple[str, ...]) -> Iterable[tuple[Path, tuple[str, ...]]]:
         return self._own_places(signature, machine)
@@ -63,7 +63,7 @@ class PieceStore(CalledStore):
             objectmode=False,
             entry_point=object(),
         )
-        self.name(signature, compiled)
+        self._give_name(signature, compiled)
         return compiled
 
 
@@ -76,10 +76,9 @@ def _is_plain(one: Any) -> bool:
         return all(map(_is_plain, one))
     if isinstance(one, types.Array | types.CPointer):
         return _is_plain(one.dtype)
-    if isinstance(one, types.Dispatcher):
-        return type(one).__module__ == "renderer.jit.compiler"
     plain = types.Number | types.Boolean | types.NoneType | types.RawPointer
-    return isinstance(one, plain) or type(one).__module__ == "renderer.numerics.simd"
+    # Kernels, and vectors of SIMD, have types of this package.
+    return isinstance(one, plain) or type(one).__module__.startswith("renderer.")
 
 
 def _is_found(library: Any) -> bool:

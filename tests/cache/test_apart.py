@@ -47,10 +47,7 @@ COMPILED, LOADED = ["27", "41", "1", "1", "1", "1"], ["27", "41", "0", "0", "0",
 
 @pytest.fixture
 def package(tmp_path):
-    folder = write_package(tmp_path)
-    (folder / "far.py").write_text(APART)
-    (folder / "callers.py").write_text(CALLERS)
-    return folder
+    return write_package(tmp_path, far=APART, callers=CALLERS)
 
 
 def test_each_is_compiled_once_and_read_with_its_callers(package):

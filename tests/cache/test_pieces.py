@@ -37,10 +37,7 @@ FIRST, SECOND = RUN.format(name="first"), RUN.format(name="second")
 
 @pytest.fixture
 def package(tmp_path):
-    folder = write_package(tmp_path)
-    (folder / "under.py").write_text(BELOW)
-    (folder / "callers.py").write_text(CALLERS)
-    return folder
+    return write_package(tmp_path, under=BELOW, callers=CALLERS)
 
 
 def pieces(package):
@@ -105,7 +102,6 @@ def test_a_damaged_one_is_said_once_and_made_anew(package):
 def test_a_script_of_another_package_has_none_and_runs_once(package):
     """To read one that was kept when the script was imported imported it again, and ran it twice."""
     (package.parent / "script.py").write_text("""
-import sys
 from renderer.jit.decorators import kernel
 @kernel
 def inner(x): return x + 1
@@ -121,6 +117,34 @@ print(second(3) if __name__ == "__main__" else first(3))
     done = start(package, "import runpy; runpy.run_path('script.py', run_name='__main__')")
     assert done.stdout.split() == ["9"] and "is damaged" not in done.stderr
     assert not list(package.parent.glob("__pycache__/*.piece"))
+
+
+def test_one_in_another_package_does_not_contain_what_was_edited(package):
+    mine = "from renderer.jit.decorators import kernel\nfrom theirs import deep\n"
+    theirs = "from renderer.jit.decorators import kernel\n@kernel\ndef deep(x): return x + 5\n"
+    (package.parent / "theirs.py").write_text(theirs)
+    (package.parent / "mine.py").write_text(mine + "@kernel\ndef middle(x): return 2 * deep(x)\n")
+    for name in ("one", "two"):
+        caller = mine.replace("theirs", "mine").replace("deep", "middle")
+        (package.parent / f"{name}.py").write_text(f"{caller}@kernel\ndef top(x): return middle(x)\n")
+    assert run(package, "from one import top; print(top(3))") == ["16"]
+    (package.parent / "theirs.py").write_text(theirs.replace("+ 5", "+ 50"))
+    done = start(package, "from two import top; print(top(3))")
+    assert done.stdout.split() == ["106"] and "is damaged" not in done.stderr
+
+
+def test_one_whose_callee_no_digest_follows_is_made_anew_after_an_edit(package):
+    """What it calls has another name then."""
+    unseen = BELOW.replace("from renderer.below.deep.bottom import STEP", "STEP = 10")
+    (package / "unseen.py").write_text(unseen)
+    (package / "under.py").write_text(
+        "import importlib\nfrom renderer.jit.decorators import kernel\n"
+        "cubed = importlib.import_module('renderer.unseen').cubed\n@kernel\ndef doubled(x): return 2 * cubed(x)\n"
+    )
+    assert run(package, FIRST) == ["75", "1", "1"]
+    (package / "unseen.py").write_text(unseen.replace("10", "20"))
+    done = start(package, SECOND)
+    assert done.stdout.split() == ["175", "1", "1"] and "is damaged" not in done.stderr
 
 
 @pytest.mark.parametrize(
