@@ -25,9 +25,10 @@ from numba.core import config
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
-from renderer.jit.digest import PACKAGE, is_ours, source_digest
+from renderer.jit.digest import PACKAGE, is_ours
 from renderer.jit.levels import AHEAD_VARIABLE, LEVELS, lacking
 from renderer.jit.notice import warn_once
+from renderer.jit.origin import digest_of, digests_of, values_of
 from renderer.jit.turns import turn, wait_no_more
 from renderer.lazy import lazy
 from renderer.system.files import write_atomically
@@ -37,7 +38,7 @@ _CARRIED = PACKAGE / "compiled"
 _SUFFIX = ".kernel"
 _HEADER = b"octree-renderer kernel 1\n"
 # To be changed when older files are no longer right, for a reason that no digest of kernels' sources shows.
-_FORM = "private pieces"
+_FORM = "origins in the key"
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,11 @@ class KernelStore:
 
     def knows(self, signature: Any) -> bool:
         """Whether files can stand for the kernel compiled for these types: all sources that decide it are known."""
-        return self._digest is not None
+        return self._digest is not None and None not in self._origins(signature)
+
+    def _origins(self, signature: Any) -> tuple[str | None, ...]:
+        """What types and values in its key stand for, beside its own sources."""
+        return (*values_of(self._function), *sorted(digests_of(tuple(signature)), key=str))
 
     def is_stored(self) -> bool:
         """Whether a file of these sources exists for any argument types, so that a later run need not compile.
@@ -169,12 +174,13 @@ class KernelStore:
 
     def _key(self, signature: Any, machine: tuple[str, ...]) -> tuple[str, ...]:
         return (
-            str(signature),
+            f"{self._name} {signature}",
             str(self._digest),
             _versions(),
             *machine,
             f"svml {config.USING_SVML}",
             f"bounds {config.BOUNDSCHECK}",
+            *map(str, self._origins(signature)),
         )
 
     def _prefix(self) -> str:
@@ -183,14 +189,6 @@ class KernelStore:
 
     def _file(self, key: tuple[str, ...]) -> str:
         return f"{self._prefix()}{_short(key[1])}-{hash_of(key)}{self.suffix}"
-
-
-def digest_of(function: Any) -> str | None:
-    """The digest of the files that the code of a kernel depends on; None if that is unknown.
-
-    A nested function stands for many functions of the same text.
-    """
-    return None if "<locals>" in function.__qualname__ else source_digest(Path(function.__code__.co_filename))
 
 
 def keep_in(folder: Path) -> None:

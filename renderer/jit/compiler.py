@@ -18,10 +18,12 @@ from importlib import import_module
 from typing import Any
 
 from numba.core import types
+from numba.core.codegen import RuntimeLinker
 from numba.core.compiler import CompilerBase, CompileResult, compile_result
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import LoweringPass, PassManager, register_pass
 from numba.core.datamodel.models import OpaqueModel
+from numba.core.errors import UnsupportedError
 from numba.core.imputils import lower_constant
 from numba.core.registry import CPUDispatcher
 from numba.core.serialize import dumps
@@ -42,8 +44,6 @@ from renderer.jit.notice import compiling
 from renderer.jit.pieces import PieceStore
 from renderer.lazy import lazy
 
-# No array is allocated in a kernel, so none counts references: Numba's counts take a locked instruction each.
-# Every option is set, because Numba would copy an unset one from the kernel that calls this one.
 if hasattr(os, "register_at_fork"):
     # A child forked while another thread compiles or loads would wait for ever for Numba's lock.
     os.register_at_fork(
@@ -52,6 +52,11 @@ if hasattr(os, "register_at_fork"):
         after_in_child=global_compiler_lock.release,
     )
 
+# How names begin by which Numba calls what is not compiled yet.
+_UNRESOLVED = RuntimeLinker.PREFIX
+
+# No array is allocated in a kernel, so none counts references: Numba's counts take a locked instruction each.
+# Every option is set, because Numba would copy an unset one from the kernel that calls this one.
 OPTIONS = {
     "nopython": True,
     "nogil": True,
@@ -73,10 +78,23 @@ class _LowerPiece(NativeLowering):  # type: ignore[misc]
         state.flags.no_compile = True
         state.flags.no_cpython_wrapper = True
         super().run_pass(state)
+        _refuse_recursion(state)
         key = object()  # by which callers find it, in place of a function that Python can call
         state.cr = state.cr._replace(cfunc=key)
         state.targetctx.insert_user_function(key, state.cr.fndesc, [state.library])
         return True
+
+
+def _refuse_recursion(state: Any) -> None:
+    """Raise ``UnsupportedError`` if a piece calls one that is not compiled before it: pieces are linked by what they
+    contain.
+    """
+    names = [variable.name for variable in state.library._final_module.global_variables]
+    if any(name.startswith(_UNRESOLVED) for name in names):
+        raise UnsupportedError(
+            f"kernel {state.func_id.func_qualname}({', '.join(map(str, state.args))}): expected calls of itself with "
+            "these types alone, and of kernels that do not call it, got a call in turn or with other types"
+        )
 
 
 class _Link(LoweringPass):  # type: ignore[misc]

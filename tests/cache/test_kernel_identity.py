@@ -150,3 +150,112 @@ open(own.__file__, "w").write({text.replace("+ 5", "+ 500")!r})
 print(importlib.reload(own).top(3))
 """
     assert run(package, script) == ["8", "503"]
+
+
+# A caller in a file of its own, and what it imports or gets: by text, by environment, or by both.
+TOP = "from renderer.jit.decorators import kernel\n"
+CALLER = f"{TOP}from theirs import STEP, Pair, deep\n"
+THEIRS = f"""{TOP}
+import os
+from typing import NamedTuple
+import numpy as np
+class Pair(NamedTuple):
+    first: int
+    second: int
+STEP, TABLE = int(os.environ.get("STEP") or 5), np.array([5.0, 6.0])
+STEPS = STEP, 6
+@kernel
+def deep(x): return x + 5
+@kernel
+def deeper(x): return x + STEP
+def make(step):
+    @kernel
+    def made(x): return x + step
+    return made
+made = make(STEP)
+"""
+BRANCH = f"""{TOP}
+import os
+if os.environ.get("STEP"):
+    @kernel
+    def top(x): return x + int(7)
+else:
+    @kernel
+    def top(x): return x + int(5)
+"""
+EDIT = ("theirs", "5", "7")  # in as many columns
+
+
+@pytest.mark.parametrize(
+    ("caller", "call", "answers", "edit", "step"),
+    [
+        (f"{CALLER}@kernel\ndef top(x): return deep(x)", "top(3)", ("8", "10"), EDIT, ""),
+        (f"{CALLER}@kernel\ndef top(x): return x + STEP", "top(3)", ("8", "10"), None, "7"),
+        (f"{TOP}import theirs\n@kernel\ndef top(x): return x + theirs.STEP", "top(3)", ("8", "10"), None, "7"),
+        (f"{TOP}from theirs import TABLE\n@kernel\ndef top(x): return x + TABLE[0]", "top(3)", ("8.0", "10.0"),
+         EDIT, ""),
+        (f"{CALLER}@kernel\ndef top(x): return Pair(x, 2 * x).first", "top(3)", ("3", "6"),
+         ("theirs", "first: int\n    second", "second: int\n    first"), ""),
+        (f"{CALLER}@kernel\ndef top(f, x): return f(x)", "top(theirs.deep, 3)", ("8", "10"), EDIT, ""),
+        (f"{CALLER}@kernel\ndef top(f, x): return f(x)", "top(theirs.deeper, 3)", ("8", "10"), None, "7"),
+        (f"{TOP}from theirs import STEPS\n@kernel\ndef top(x): return x + STEPS[0]", "top(3)", ("8", "10"), None, "7"),
+        (f"{TOP}from theirs import made\n@kernel\ndef top(x): return made(x)", "top(3)", ("8", "10"), None, "7"),
+        (BRANCH, "top(3)", ("8", "10"), None, "7"),
+        (f"{BRANCH}@kernel\ndef outer(x): return top(x)", "outer(3)", ("8", "10"), None, "7"),
+    ],
+    ids=["callee", "constant", "module", "array", "class", "argument", "argument's constant", "tuple", "factory",
+         "branch", "branch below"],
+)  # fmt: skip
+def test_a_kernel_of_another_package_follows_what_it_names(package, caller, call, answers, edit, step):
+    """Its own file is the same in both runs; a third run reads what the second wrote."""
+    (package.parent / "theirs.py").write_text(THEIRS)
+    (package.parent / "own.py").write_text(caller)
+    entry = call[: call.index("(")]
+    script = f"import theirs\nfrom own import *\nprint({call}, sum({entry}.entry.stats.cache_hits.values()))"
+    assert run(package, script) == [answers[0], "0"]
+    if edit is not None:
+        name, before, after = edit
+        path = package.parent / f"{name}.py"
+        path.write_text(path.read_text().replace(before, after))
+    assert run(package, script, STEP=step) == [answers[1], "0"]
+    assert run(package, script, STEP=step) == [answers[1], "1"]
+
+
+def test_kernels_of_one_name_in_one_file_are_told_apart(package):
+    text = """
+small, large = kernel(lambda x: x + 1), kernel(lambda x: x + 100)
+@kernel
+def top(x): return x + 1
+first = top
+@kernel
+def top(x): return x + 100
+print(small(1), large(1), first(1), top(1))
+"""
+    for _ in range(2):
+        assert mine(package, text) == ["2", "101", "2", "101"]
+
+
+def test_a_file_in_the_place_of_another_kernel_s_is_not_taken_for_it(package):
+    text = f"{TOP}@kernel\ndef up(x): return x + 1\n@kernel\ndef down(x): return x - 1\n"
+    (package / "both.py").write_text(text)
+    script = "from renderer.both import *; print(up(5), down(5))"
+    assert run(package, script) == ["6", "4"]
+    up, down = (next(package.glob(f"__pycache__/renderer.both.{name}-*.kernel")) for name in ("up", "down"))
+    shutil.copy(up, down)
+    assert run(package, script) == ["6", "4"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "@kernel\ndef even(n): return True if n == 0 else odd(n - 1)\n"
+        "@kernel\ndef odd(n): return False if n == 0 else even(n - 1)\ncall = lambda: even(4)",
+        "@kernel\ndef down(n, x): return x * 1.0 if n == 0 else down(n - 1, x * 0.5)\ncall = lambda: down(4, 3)",
+    ],
+    ids=["in turn", "other types"],
+)
+def test_recursion_that_cannot_be_linked_is_refused(package, text):
+    """It ended the process, or the next one."""
+    text += "\ntry:\n    print(call())\nexcept Exception as error:\n    print('expected calls of itself' in str(error))"
+    for _ in range(2):
+        assert mine(package, text) == ["True"]
