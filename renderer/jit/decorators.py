@@ -1,9 +1,9 @@
 """The decorators of kernels: no GIL, no fastmath, C's rules for division, machine code kept on disk.
 
 Python and other kernels call a kernel alike. It allocates nothing and raises nothing; the caller keeps its arrays
-alive. In another package, a kernel is compiled again after edits of its own file, of this package or of the kernels that
-it calls, and for other values of the constants that it names. A nested kernel is never kept on disk. A kernel may call
-itself with the types that it got; other recursion raises ``numba.errors.UnsupportedError``.
+alive. In another package, a kernel is compiled again after edits of its own file, of this package or of the kernels
+that it calls, and for other values of the constants that it names. A nested kernel is never kept on disk. A kernel may
+call itself with the types that it got; other recursion raises ``numba.errors.UnsupportedError``.
 """
 
 from collections.abc import Callable
