@@ -26,6 +26,10 @@ _OUT_OF_PLANE = 0.05
 _FLAT = 1e-12
 _ROUNDED = 2.0**-52
 _TRIES = 8
+# A corner this near to an edge, over the extent, may be on it but for a rounding to float32.
+_TOUCHING = 2.0**-21
+# Corners up to which they are compared with all edges: some 100 MB.
+_MOST_TOUCHING = 1 << 10
 _BLOCK_CORNERS = 1 << 18
 
 
@@ -147,6 +151,16 @@ def _cut_notched(positions: _Floats, polygons: _Ints) -> Iterator[tuple[int, _In
 
 def _cut_outline(outline: _Floats) -> _Ints | None:
     """Triangles of an outline (n, 2) that is wound counter-clockwise; None where they do not cover it once."""
+    triangles = _covered(outline)
+    if triangles is None and len(outline) <= _MOST_TOUCHING:
+        ring = _with_touching(outline)
+        triangles = _covered(outline[ring]) if len(ring) > len(outline) else None
+        return None if triangles is None else ring[triangles]
+    return triangles
+
+
+def _covered(outline: _Floats) -> _Ints | None:
+    """``_cut_outline`` of an outline whose corners lie beside its edges, or on their other corners."""
     # Imported here, because few files have such polygons.
     from mapbox_earcut import triangulate_float64
 
@@ -161,6 +175,23 @@ def _cut_outline(outline: _Floats) -> _Ints | None:
         if len(areas) and areas.min() >= -_FLAT and abs(areas.sum() - whole.sum()) <= room:
             return triangles
     return None
+
+
+def _with_touching(outline: _Floats) -> _Ints:
+    """The numbers of an outline's corners, also between the ends of each edge on which they lie but for rounding."""
+    n = len(outline)
+    starts, ends = outline, np.roll(outline, -1, axis=0)
+    along = (ends - starts)[:, None]
+    to = outline[None] - starts[:, None]
+    squares = (along**2).sum(axis=2)
+    places = (to * along).sum(axis=2) / np.where(squares > 0.0, squares, 1.0)
+    off = along[..., 0] * to[..., 1] - along[..., 1] * to[..., 0]
+    touching = (np.abs(off) <= _TOUCHING * np.sqrt(squares)) & (places > 0.0) & (places < 1.0)
+    own = np.arange(n)
+    touching[own, own] = touching[own, (own + 1) % n] = False
+    edges, corners = np.nonzero(touching)
+    order = np.lexsort((places[edges, corners], edges))
+    return np.insert(own, edges[order] + 1, corners[order])
 
 
 def _doubled_areas(outline: _Floats, triangles: _Ints) -> _Floats:

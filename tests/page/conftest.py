@@ -8,7 +8,7 @@ import pytest
 from viewer_page import SCENE, Viewer, chromium, served
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def scenes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a scene, another one and one that cannot be loaded."""
     folder = tmp_path_factory.mktemp("scenes")
@@ -18,20 +18,20 @@ def scenes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def url(scenes: Path) -> Iterator[str]:
     with served(scenes / "blocks.toml") as address:
         yield address
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
     pytest.importorskip("uvicorn", reason="the extra viewer is not installed")
     with chromium() as started:
         yield started
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def opened(browser: Any, url: str) -> Iterator[Viewer]:
     """The page that most tests share, because opening one takes a second."""
     with Viewer(browser, url).open() as page:
