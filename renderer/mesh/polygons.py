@@ -26,8 +26,6 @@ _OUT_OF_PLANE = 0.05
 _FLAT = 1e-12
 _ROUNDED = 2.0**-52
 _TRIES = 8
-# A corner this near to an edge, over the extent, may be on it but for a rounding to float32.
-_TOUCHING = 2.0**-21
 # Corners up to which they are compared with all edges: some 100 MB.
 _MOST_TOUCHING = 1 << 10
 _BLOCK_CORNERS = 1 << 18
@@ -186,7 +184,7 @@ def _with_touching(outline: _Floats) -> _Ints:
     squares = (along**2).sum(axis=2)
     places = (to * along).sum(axis=2) / np.where(squares > 0.0, squares, 1.0)
     off = along[..., 0] * to[..., 1] - along[..., 1] * to[..., 0]
-    touching = (np.abs(off) <= _TOUCHING * np.sqrt(squares)) & (places > 0.0) & (places < 1.0)
+    touching = (np.abs(off) <= _FLAT * np.sqrt(squares)) & (places > 0.0) & (places < 1.0)
     own = np.arange(n)
     touching[own, own] = touching[own, (own + 1) % n] = False
     edges, corners = np.nonzero(touching)

@@ -191,15 +191,14 @@ def test_polygons_that_touch_themselves_are_covered_once(name: str, frame: str) 
 
 
 @settings(max_examples=60)
-@given(st.sampled_from(["corner on an edge", "folded back"]), st.integers(0, 10**6), st.booleans())
-def test_a_corner_on_an_edge_may_be_beyond_it_by_rounding(name: str, seed: int, single: bool) -> None:
-    """A quarter of such polygons kept a wrong fan, and two fifths of those in float32."""
+@given(st.sampled_from(["corner on an edge", "folded back"]), st.integers(0, 10**6))
+def test_a_corner_on_an_edge_may_be_beyond_it_by_rounding(name: str, seed: int) -> None:
+    """An eighth of such polygons kept a wrong fan."""
     outline, area = TOUCHING[name]
     points = placed(outline, np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0])
-    points = points.astype(np.float32).astype(np.float64) if single else points
     whole = doubled_areas(points, fan(len(points))).sum(axis=0)
     parts = doubled_areas(points, cut(points)) @ (whole / np.linalg.norm(whole))
-    assert parts.min() >= -1e-6 and parts.sum() == pytest.approx(2 * area, rel=1e-6)
+    assert parts.min() >= -1e-12 and parts.sum() == pytest.approx(2 * area, rel=1e-9)
 
 
 PENTAGRAM = [star(5)[1::2][k] for k in (0, 2, 4, 1, 3)]
