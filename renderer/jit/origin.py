@@ -76,9 +76,11 @@ def _named_values(function: Any) -> Iterator[Any]:
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
         known[name] = cell.cell_contents
     pending = [value for _, value in sorted(known.items(), key=itemgetter(0))]
+    modules: set[ModuleType] = set()
     while pending:
         value = pending.pop()
-        if isinstance(value, ModuleType):
+        if isinstance(value, ModuleType) and value not in modules:
+            modules.add(value)
             pending += [vars(value)[name] for name in names if name in vars(value)]
         elif isinstance(value, tuple):
             pending += value

@@ -157,6 +157,7 @@ TOP = "from renderer.jit.decorators import kernel\n"
 CALLER = f"{TOP}from theirs import STEP, Pair, deep\n"
 THEIRS = f"""{TOP}
 import os
+import theirs as itself
 from typing import NamedTuple
 import numpy as np
 class Pair(NamedTuple):
@@ -191,7 +192,7 @@ EDIT = ("theirs", "5", "7")  # in as many columns
     [
         (f"{CALLER}@kernel\ndef top(x): return deep(x)", "top(3)", ("8", "10"), EDIT, ""),
         (f"{CALLER}@kernel\ndef top(x): return x + STEP", "top(3)", ("8", "10"), None, "7"),
-        (f"{TOP}import theirs\n@kernel\ndef top(x): return x + theirs.STEP", "top(3)", ("8", "10"), None, "7"),
+        (f"{TOP}import theirs\n@kernel\ndef top(x): return x + theirs.itself.STEP", "top(3)", ("8", "10"), None, "7"),
         (f"{TOP}from theirs import TABLE\n@kernel\ndef top(x): return x + TABLE[0]", "top(3)", ("8.0", "10.0"),
          EDIT, ""),
         (f"{CALLER}@kernel\ndef top(x): return Pair(x, 2 * x).first", "top(3)", ("3", "6"),
