@@ -82,7 +82,7 @@ class KernelStore:
 
     def _origins(self, signature: Any) -> tuple[str | None, ...]:
         """What types and values in its key stand for, beside its own sources."""
-        return (*values_of(self._function), *sorted(digests_of(tuple(signature)), key=str))
+        return (*values_of(self._function), *digests_of(tuple(signature)))
 
     def is_stored(self) -> bool:
         """Whether a file of these sources exists for any argument types, so that a later run need not compile.

@@ -3,16 +3,21 @@
 import hashlib
 import sys
 from collections.abc import Iterator
+from enum import Enum, EnumType
 from functools import cache
 from operator import itemgetter
 from pathlib import Path
-from types import ModuleType
+from types import BuiltinFunctionType, CodeType, ModuleType
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numba.core import types
 
 from renderer.jit.digest import is_ours, source_digest
+
+# Stands for a value of which nothing is known.
+_UNKNOWN = object()
 
 
 def digest_of(function: Any) -> str | None:
@@ -25,80 +30,111 @@ def digest_of(function: Any) -> str | None:
 
 def values_of(function: Any) -> tuple[str | None, ...]:
     """What the digest of a kernel in another package leaves open: which function of the file it is, the values that it
-    names, and the same of the kernels that it calls. Empty for a kernel of this package; None among them where a source
-    is unknown.
+    names, and the same of the kernels that it calls. Empty for a kernel of this package; None among them where that is
+    unknown, or has changed since it was first needed: what was compiled then may be a part of what is compiled now.
     """
     found: list[str | None] = []
     seen: set[Any] = set()
     functions = [function]
     while functions:
         one = functions.pop()
-        if one in seen or is_ours(_file_of(one)):
-            continue
-        seen.add(one)
-        code = one.__code__
-        lines = hashlib.sha256(code.co_linetable).hexdigest()
-        found += [source_digest(_file_of(one)), f"{one.__qualname__} {code.co_firstlineno} {lines}"]
-        values = list(_named_values(one))
-        functions += [value.py_func for value in values if hasattr(value, "py_func")]
-        found += [_text(value) for value in values]
+        if one not in seen and not is_ours(_file_of(one)):
+            seen.add(one)
+            values = list(_named_values(one))
+            functions += [value.py_func for value in values if hasattr(value, "py_func")]
+            own = (source_digest(_file_of(one)), _place_of(one), *map(_text, values))
+            found += own if own == _at_first.setdefault(one, own) else (None,)
     return tuple(found)
 
 
+_at_first: WeakKeyDictionary[Any, tuple[str | None, ...]] = WeakKeyDictionary()
+
+
 @cache
-def digests_of(signature: tuple[Any, ...]) -> frozenset[str | None]:
-    """The digests of the sources of kernels and of named tuples' classes among types, at any depth.
+def digests_of(signature: tuple[Any, ...]) -> tuple[str | None, ...]:
+    """The digests of the sources of kernels and of named tuples' classes among types, at any depth, in their order.
 
     None where one is unknown, as that of a nested kernel.
     """
-    digests: set[str | None] = set()
+    digests: list[str | None] = []
     pending = list(signature)
     while pending:
         one = pending.pop()
         if isinstance(one, types.Dispatcher):
             function = one.dispatcher.py_func
-            digests |= {digest_of(function), *values_of(function)}
+            # The text of Numba's own type is that of one process.
+            digests += (digest_of(function), *values_of(function), None if type(one) is types.Dispatcher else "")
         if isinstance(one, types.BaseNamedTuple):
-            digests.add(_class_text(one.instance_class))
+            digests.append(_class_text(one.instance_class))
         if isinstance(one, types.BaseTuple):
             pending += one
-    return frozenset(digests)
+    return tuple(digests)
 
 
 def _file_of(function: Any) -> Path:
     return Path(function.__code__.co_filename)
 
 
+def _place_of(function: Any) -> str:
+    """Which function of its file it is."""
+    code = function.__code__
+    return f"{function.__qualname__} {code.co_firstlineno} {hashlib.sha256(code.co_linetable).hexdigest()}"
+
+
 def _named_values(function: Any) -> Iterator[Any]:
-    """The values of the globals and of the outer function's variables that a function names, and those of modules."""
-    names = function.__code__.co_names
+    """The values of the globals and of the outer function's variables that a function names, those of modules and
+    tuples, and its defaults; ``_UNKNOWN`` where one cannot be seen.
+    """
+    names = _names_in(function.__code__)
     known = {name: function.__globals__[name] for name in names if name in function.__globals__}
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
-        known[name] = cell.cell_contents
+        try:
+            known[name] = cell.cell_contents
+        except ValueError:  # empty as yet
+            known[name] = _UNKNOWN
     pending = [value for _, value in sorted(known.items(), key=itemgetter(0))]
+    pending += [function.__defaults__, *sorted((function.__kwdefaults__ or {}).items())]
     modules: set[ModuleType] = set()
     while pending:
         value = pending.pop()
         if isinstance(value, ModuleType) and value not in modules:
             modules.add(value)
-            pending += [vars(value)[name] for name in names if name in vars(value)]
+            pending += [getattr(value, name) for name in names if hasattr(value, name)]
         elif isinstance(value, tuple):
             pending += value
         yield value
 
 
+def _names_in(code: CodeType) -> list[str]:
+    """The names of globals and attributes in a function and in those within it."""
+    inner = [name for one in code.co_consts if isinstance(one, CodeType) for name in _names_in(one)]
+    return sorted({*code.co_names, *inner})
+
+
 def _text(value: Any) -> str | None:
-    """A text that differs where values differ that a kernel takes for constants."""
+    """A text that differs where values differ that a kernel takes for constants; None for one of unknown kind."""
+    defined = getattr(value, "_defn", value)  # of an intrinsic
+    if hasattr(value, "py_func"):
+        return f"kernel {getattr(value, 'targetoptions', '')}"
+    if hasattr(defined, "__code__"):
+        return "ours" if is_ours(_file_of(defined)) else source_digest(_file_of(defined))
     if isinstance(value, np.ndarray):
         return f"{value.dtype} {value.shape} {hashlib.sha256(value.tobytes()).hexdigest()}"
-    if isinstance(value, type) and issubclass(value, tuple):
+    if isinstance(value, EnumType | Enum):
+        return f"{value!r} {list(value if isinstance(value, EnumType) else type(value))}"
+    if isinstance(value, tuple):
+        return f"{len(value)} {_class_text(type(value))}"
+    if isinstance(value, type):
         return _class_text(value)
-    is_plain = isinstance(value, bool | int | float | complex | str | bytes | np.generic | None)
-    return repr(value) if is_plain else type(value).__qualname__
+    if isinstance(value, BuiltinFunctionType | np.ufunc | ModuleType):
+        return f"{getattr(value, '__module__', '')} {value.__name__}"
+    if isinstance(value, bool | int | float | complex | str | bytes | np.generic | types.Type | None):
+        return f"{type(value)} {value!r}"
+    return None
 
 
 def _class_text(one: Any) -> str | None:
-    """What a named tuple's class is. Two classes of one name have types of one text."""
+    """What a class is. Two named tuples of one name have types of one text."""
     file = getattr(sys.modules.get(one.__module__), "__file__", None)
     source = source_digest(Path(file)) if file else one.__module__
     return source and f"{source} {one.__module__}.{one.__qualname__} {getattr(one, '_fields', ())}"

@@ -176,7 +176,9 @@ def _covered(outline: _Floats) -> _Ints | None:
 
 
 def _with_touching(outline: _Floats) -> _Ints:
-    """The numbers of an outline's corners, also between the ends of each edge on which they lie but for rounding."""
+    """The numbers of an outline's corners, also between the ends of each edge on which they lie but for rounding; each
+    once where edges cross.
+    """
     n = len(outline)
     starts, ends = outline, np.roll(outline, -1, axis=0)
     along = (ends - starts)[:, None]
@@ -184,8 +186,12 @@ def _with_touching(outline: _Floats) -> _Ints:
     squares = (along**2).sum(axis=2)
     places = (to * along).sum(axis=2) / np.where(squares > 0.0, squares, 1.0)
     off = along[..., 0] * to[..., 1] - along[..., 1] * to[..., 0]
-    touching = (np.abs(off) <= _FLAT * np.sqrt(squares)) & (places > 0.0) & (places < 1.0)
-    own = np.arange(n)
+    on_line = np.abs(off) <= _FLAT * np.sqrt(squares)
+    own, sides = np.arange(n), np.where(on_line, 0.0, np.sign(off))
+    apart = sides * np.roll(sides, -1, axis=1) < 0.0
+    if (apart & apart.T).any():
+        return own
+    touching = on_line & (places > 0.0) & (places < 1.0)
     touching[own, own] = touching[own, (own + 1) % n] = False
     edges, corners = np.nonzero(touching)
     order = np.lexsort((places[edges, corners], edges))

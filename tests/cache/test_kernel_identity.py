@@ -156,8 +156,10 @@ print(importlib.reload(own).top(3))
 TOP = "from renderer.jit.decorators import kernel\n"
 CALLER = f"{TOP}from theirs import STEP, Pair, deep\n"
 THEIRS = f"""{TOP}
+import enum
 import os
 import theirs as itself
+from numba.extending import register_jitable
 from typing import NamedTuple
 import numpy as np
 class Pair(NamedTuple):
@@ -174,6 +176,18 @@ def make(step):
     def made(x): return x + step
     return made
 made = make(STEP)
+class Turned(NamedTuple):
+    second: int
+    first: int
+ONE = Pair(5, 6)
+call = min if STEP == 5 else max
+@register_jitable
+def plain(x): return x + 5
+class Step(enum.IntEnum):
+    ONE = STEP
+@kernel
+def usual(x, more=STEP): return x + more
+nested = ((1, 2), 3) if STEP == 5 else ((1, 2, 3),)
 """
 BRANCH = f"""{TOP}
 import os
@@ -201,11 +215,23 @@ EDIT = ("theirs", "5", "7")  # in as many columns
         (f"{CALLER}@kernel\ndef top(f, x): return f(x)", "top(theirs.deeper, 3)", ("8", "10"), None, "7"),
         (f"{TOP}from theirs import STEPS\n@kernel\ndef top(x): return x + STEPS[0]", "top(3)", ("8", "10"), None, "7"),
         (f"{TOP}from theirs import made\n@kernel\ndef top(x): return made(x)", "top(3)", ("8", "10"), None, "7"),
+        (f"{CALLER}@kernel\ndef top(p, q): return p.first - q.first",
+         "top(Pair(1, 2), theirs.Turned(3, 4))", ("-3", "-2"),
+         ("theirs", "first: int\n    second", "second: int\n    first"), ""),
+        (f"{TOP}from theirs import ONE\n@kernel\ndef top(x): return x + ONE.first", "top(3)", ("8", "9"),
+         ("theirs", "first: int\n    second", "second: int\n    first"), ""),
+        (f"{TOP}from theirs import call\n@kernel\ndef top(x): return call(x, 9)", "top(3)", ("3", "9"), None, "7"),
+        (f"{TOP}from theirs import plain\n@kernel\ndef top(x): return plain(x)", "top(3)", ("8", "10"), EDIT, ""),
+        (f"{TOP}from theirs import Step\n@kernel\ndef top(x): return x + Step.ONE", "top(3)", ("8", "10"), None, "7"),
+        (f"{TOP}from theirs import usual\n@kernel\ndef top(x): return usual(x)", "top(3)", ("8", "10"), None, "7"),
+        (f"{TOP}from theirs import nested\n@kernel\ndef top(x): return x + len(nested)",
+         "top(3)", ("5", "4"), None, "7"),
         (BRANCH, "top(3)", ("8", "10"), None, "7"),
         (f"{BRANCH}@kernel\ndef outer(x): return top(x)", "outer(3)", ("8", "10"), None, "7"),
     ],
     ids=["callee", "constant", "module", "array", "class", "argument", "argument's constant", "tuple", "factory",
-         "branch", "branch below"],
+         "two classes", "value of a class", "builtin", "function", "enumeration", "default", "lengths", "branch",
+         "branch below"],
 )  # fmt: skip
 def test_a_kernel_of_another_package_follows_what_it_names(package, caller, call, answers, edit, step):
     """Its own file is the same in both runs; a third run reads what the second wrote."""
@@ -220,6 +246,25 @@ def test_a_kernel_of_another_package_follows_what_it_names(package, caller, call
         path.write_text(path.read_text().replace(before, after))
     assert run(package, script, STEP=step) == [answers[1], "0"]
     assert run(package, script, STEP=step) == [answers[1], "1"]
+
+
+def test_classes_that_are_exchanged_are_told_apart(package):
+    text = """
+from collections import namedtuple
+one, two = namedtuple("P", "x y"), namedtuple("P", "y x")
+@kernel
+def top(p, q): return 10 * p.x + q.x
+print(top(one(1, 2), two(3, 4)), top(two(1, 2), one(3, 4)))
+"""
+    assert mine(package, text) == ["14", "23"]
+
+
+def test_a_constant_that_changes_in_a_process_spoils_no_later_one(package):
+    """The first value is that of what was compiled with it."""
+    text = "STEP = 1\n@kernel\ndef low(x): return x * STEP\n@kernel\ndef one(x): return low(x)\n@kernel\n"
+    text += "def two(x): return low(x)\nif sys.argv[1:]: one(3)\nSTEP = 2\nprint(two(3))"
+    mine(package, text, "early")
+    assert mine(package, text) == ["6"]
 
 
 def test_kernels_of_one_name_in_one_file_are_told_apart(package):

@@ -204,7 +204,11 @@ def test_a_corner_on_an_edge_may_be_beyond_it_by_rounding(name: str, seed: int) 
 PENTAGRAM = [star(5)[1::2][k] for k in (0, 2, 4, 1, 3)]
 
 
-@cases("outline", [[(0, 0), (1, 1), (1, 0), (0, 1)], [(0, 0), (2, 2), (2, 0), (0, 1)], PENTAGRAM])
+# It has corners on its edges too, and triangles with its area that do not cover it.
+CHANCE: Outline = [(1, 0), (2, 2), (1, 2), (1, 2), (2, 0), (2, 2), (0, 2), (2, 0)]
+
+
+@cases("outline", [[(0, 0), (1, 1), (1, 0), (0, 1)], [(0, 0), (2, 2), (2, 0), (0, 1)], PENTAGRAM, CHANCE])
 def test_polygons_that_cross_themselves_are_named(outline: Outline) -> None:
     found = cut_of(placed(SQUARE), placed(outline), placed(L_SHAPE))
     assert found.wrong.tolist() == [1]
