@@ -81,7 +81,7 @@ class KernelStore:
         return self._digest is not None and None not in self._origins(signature)
 
     def _origins(self, signature: Any) -> tuple[str | None, ...]:
-        """What types and values in its key stand for, beside its own sources."""
+        """Texts of the values that it names and of its arguments' types, beside the digest of its own sources."""
         return (*values_of(self._function), *digests_of(tuple(signature)))
 
     def is_stored(self) -> bool:

@@ -52,9 +52,6 @@ if hasattr(os, "register_at_fork"):
         after_in_child=global_compiler_lock.release,
     )
 
-# How names begin by which Numba calls what is not compiled yet.
-_UNRESOLVED = RuntimeLinker.PREFIX
-
 # No array is allocated in a kernel, so none counts references: Numba's counts take a locked instruction each.
 # Every option is set, because Numba would copy an unset one from the kernel that calls this one.
 OPTIONS = {
@@ -89,8 +86,8 @@ def _refuse_recursion(state: Any) -> None:
     """Raise ``UnsupportedError`` if a piece calls one that is not compiled before it: pieces are linked by what they
     contain.
     """
-    names = [variable.name for variable in state.library._final_module.global_variables]
-    if any(name.startswith(_UNRESOLVED) for name in names):
+    # By variables of such names Numba calls what is not compiled yet.
+    if any(one.name.startswith(RuntimeLinker.PREFIX) for one in state.library._final_module.global_variables):
         raise UnsupportedError(
             f"kernel {state.func_id.func_qualname}({', '.join(map(str, state.args))}): expected calls of itself with "
             "these types alone, and of kernels that do not call it, got a call in turn or with other types"

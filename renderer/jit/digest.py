@@ -14,6 +14,7 @@ PACKAGE = Path(__file__).resolve().parents[1]
 _IMPORT = re.compile(rf"^from ({PACKAGE.name}(?:\.\w+)*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 
 
+@cache
 def is_ours(path: Path) -> bool:
     """Whether a source file belongs to this package."""
     return path.resolve().is_relative_to(PACKAGE)

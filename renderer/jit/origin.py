@@ -5,7 +5,6 @@ import sys
 from collections.abc import Iterator
 from enum import Enum, EnumType
 from functools import cache
-from operator import itemgetter
 from pathlib import Path
 from types import BuiltinFunctionType, CodeType, ModuleType
 from typing import Any
@@ -18,6 +17,8 @@ from renderer.jit.digest import is_ours, source_digest
 
 # Stands for a value of which nothing is known.
 _UNKNOWN = object()
+# The texts of functions and of the values that they name, as they were when first needed.
+_at_first: WeakKeyDictionary[Any, tuple[str | None, ...]] = WeakKeyDictionary()
 
 
 def digest_of(function: Any) -> str | None:
@@ -29,9 +30,11 @@ def digest_of(function: Any) -> str | None:
 
 
 def values_of(function: Any) -> tuple[str | None, ...]:
-    """What the digest of a kernel in another package leaves open: which function of the file it is, the values that it
-    names, and the same of the kernels that it calls. Empty for a kernel of this package; None among them where that is
-    unknown, or has changed since it was first needed: what was compiled then may be a part of what is compiled now.
+    """Texts of all that the digest of a kernel in another package leaves open: which function of the file it is, the
+    values that it names, and the same of the kernels that it calls.
+
+    There are none for a kernel of this package. One is None where a value is unknown, or has changed since it was
+    first needed: what was compiled then may be a part of what is compiled now.
     """
     found: list[str | None] = []
     seen: set[Any] = set()
@@ -47,9 +50,6 @@ def values_of(function: Any) -> tuple[str | None, ...]:
     return tuple(found)
 
 
-_at_first: WeakKeyDictionary[Any, tuple[str | None, ...]] = WeakKeyDictionary()
-
-
 @cache
 def digests_of(signature: tuple[Any, ...]) -> tuple[str | None, ...]:
     """The digests of the sources of kernels and of named tuples' classes among types, at any depth, in their order.
@@ -62,8 +62,9 @@ def digests_of(signature: tuple[Any, ...]) -> tuple[str | None, ...]:
         one = pending.pop()
         if isinstance(one, types.Dispatcher):
             function = one.dispatcher.py_func
-            # The text of Numba's own type is that of one process.
-            digests += (digest_of(function), *values_of(function), None if type(one) is types.Dispatcher else "")
+            digests += digest_of(function), *values_of(function)
+            if type(one) is types.Dispatcher:  # Numba's own, whose text is that of one process
+                digests.append(None)
         if isinstance(one, types.BaseNamedTuple):
             digests.append(_class_text(one.instance_class))
         if isinstance(one, types.BaseTuple):
@@ -76,7 +77,7 @@ def _file_of(function: Any) -> Path:
 
 
 def _place_of(function: Any) -> str:
-    """Which function of its file it is."""
+    """A text that tells the functions of a file apart."""
     code = function.__code__
     return f"{function.__qualname__} {code.co_firstlineno} {hashlib.sha256(code.co_linetable).hexdigest()}"
 
@@ -92,8 +93,7 @@ def _named_values(function: Any) -> Iterator[Any]:
             known[name] = cell.cell_contents
         except ValueError:  # empty as yet
             known[name] = _UNKNOWN
-    pending = [value for _, value in sorted(known.items(), key=itemgetter(0))]
-    pending += [function.__defaults__, *sorted((function.__kwdefaults__ or {}).items())]
+    pending = [*known.values(), function.__defaults__, *(function.__kwdefaults__ or {}).items()]
     modules: set[ModuleType] = set()
     while pending:
         value = pending.pop()
@@ -117,7 +117,7 @@ def _text(value: Any) -> str | None:
     if hasattr(value, "py_func"):
         return f"kernel {getattr(value, 'targetoptions', '')}"
     if hasattr(defined, "__code__"):
-        return "ours" if is_ours(_file_of(defined)) else source_digest(_file_of(defined))
+        return source_digest(_file_of(defined))
     if isinstance(value, np.ndarray):
         return f"{value.dtype} {value.shape} {hashlib.sha256(value.tobytes()).hexdigest()}"
     if isinstance(value, EnumType | Enum):
@@ -134,7 +134,7 @@ def _text(value: Any) -> str | None:
 
 
 def _class_text(one: Any) -> str | None:
-    """What a class is. Two named tuples of one name have types of one text."""
+    """A text of a class and of its source. Two named tuples of one name have types of one text."""
     file = getattr(sys.modules.get(one.__module__), "__file__", None)
     source = source_digest(Path(file)) if file else one.__module__
     return source and f"{source} {one.__module__}.{one.__qualname__} {getattr(one, '_fields', ())}"

@@ -150,11 +150,11 @@ def _cut_notched(positions: _Floats, polygons: _Ints) -> Iterator[tuple[int, _In
 def _cut_outline(outline: _Floats) -> _Ints | None:
     """Triangles of an outline (n, 2) that is wound counter-clockwise; None where they do not cover it once."""
     triangles = _covered(outline)
-    if triangles is None and len(outline) <= _MOST_TOUCHING:
-        ring = _with_touching(outline)
-        triangles = _covered(outline[ring]) if len(ring) > len(outline) else None
-        return None if triangles is None else ring[triangles]
-    return triangles
+    if triangles is not None or len(outline) > _MOST_TOUCHING:
+        return triangles
+    ring = _with_touching(outline)
+    triangles = _covered(outline[ring]) if len(ring) > len(outline) else None
+    return None if triangles is None else ring[triangles]
 
 
 def _covered(outline: _Floats) -> _Ints | None:

@@ -177,6 +177,12 @@ TOUCHING = {
 }
 
 
+def assert_covered_once(points: NDArray[np.float64], area: float) -> None:
+    whole = doubled_areas(points, fan(len(points))).sum(axis=0)
+    parts = doubled_areas(points, cut(points)) @ (whole / np.linalg.norm(whole))
+    assert parts.min() >= -1e-12 and parts.sum() == pytest.approx(2 * area, rel=1e-9)
+
+
 @cases("frame", FRAMES)
 @cases("name", TOUCHING)
 def test_polygons_that_touch_themselves_are_covered_once(name: str, frame: str) -> None:
@@ -185,9 +191,7 @@ def test_polygons_that_touch_themselves_are_covered_once(name: str, frame: str) 
     for shift in {0, 1, len(outline) // 2}:
         points = np.roll(placed(outline, FRAMES[frame]), shift, axis=0)
         for turned in (points, points[::-1]):
-            whole = doubled_areas(turned, fan(len(turned))).sum(axis=0)
-            parts = doubled_areas(turned, cut(turned)) @ (whole / np.linalg.norm(whole))
-            assert parts.min() >= -1e-12 and parts.sum() == pytest.approx(2 * area, rel=1e-9)
+            assert_covered_once(turned, area)
 
 
 @settings(max_examples=60)
@@ -196,14 +200,10 @@ def test_a_corner_on_an_edge_may_be_beyond_it_by_rounding(name: str, seed: int) 
     """An eighth of such polygons kept a wrong fan."""
     outline, area = TOUCHING[name]
     points = placed(outline, np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0])
-    whole = doubled_areas(points, fan(len(points))).sum(axis=0)
-    parts = doubled_areas(points, cut(points)) @ (whole / np.linalg.norm(whole))
-    assert parts.min() >= -1e-12 and parts.sum() == pytest.approx(2 * area, rel=1e-9)
+    assert_covered_once(points, area)
 
 
 PENTAGRAM = [star(5)[1::2][k] for k in (0, 2, 4, 1, 3)]
-
-
 # It has corners on its edges too, and triangles with its area that do not cover it.
 CHANCE: Outline = [(1, 0), (2, 2), (1, 2), (1, 2), (2, 0), (2, 2), (0, 2), (2, 0)]
 

@@ -144,7 +144,7 @@ def test_the_workflow_of_the_guide_installs_from_git_and_judges(checkout, projec
     pip(checkout, *shlex.split(command))
     program, *arguments = shlex.split(judge)
     # The sources are those of this checkout, and so are its kernels: to compile them again takes two minutes.
-    ahead = {AHEAD_VARIABLE: trace_chunk.store.cache_path}
+    ahead = {AHEAD_VARIABLE: trace_chunk.store.cache_path or ""}
     said = run([programs(checkout) / program, *arguments, "--quick"], project, **ahead)
     assert "validation: PASS" in said
     assert {"index.html", "metrics.json", "junit.xml"} <= {path.name for path in (project / "build/report").iterdir()}

@@ -4,12 +4,13 @@ import numpy as np
 
 from renderer.mesh.shapes import box
 from validation.oracle.placing import Body
+from validation.oracle.rounding import FLOAT32_ROUNDOFF
 from validation.references.mitsuba.attributes import attributes
 from validation.references.mitsuba.instances import MitsubaInstances
 
 CUBE = box()
 # Embree divides by a reciprocal that AMD's processors approximate otherwise than Intel's: two roundings of float32.
-ROUNDED = 2.0**-23
+ROUNDED = 2 * FLOAT32_ROUNDOFF
 
 
 def test_instances_are_hit_where_they_stand_and_faces_are_numbered_on() -> None:
