@@ -28,11 +28,14 @@ class Vector(types.Type):
 F32X8 = Vector("f32", 8)
 F64X4 = Vector("f64", 4)
 F64X8 = Vector("f64", 8)
+I32X8 = Vector("i32", 8)
 I64X8 = Vector("i64", 8)
 MASK8 = Vector("mask", 8)
 MASK4 = Vector("mask", 4)
 
-_ELEMENT = {"f32": ir.FloatType(), "f64": ir.DoubleType(), "i64": ir.IntType(64), "mask": ir.IntType(1)}
+_ELEMENT = {
+    "f32": ir.FloatType(), "f64": ir.DoubleType(), "i32": ir.IntType(32), "i64": ir.IntType(64), "mask": ir.IntType(1),
+}  # fmt: skip
 _NUMBER = {"f32": types.float32, "f64": types.float64}
 _MASK_OF = {8: MASK8, 4: MASK4}
 
@@ -293,12 +296,13 @@ def _load(builder: Any, pointer: Any, array_type: Any) -> Any:
 
 @intrinsic
 def load8(typingctx, array, index):
-    """Eight float32 from a one-dimensional float32 array, starting at ``index``."""
+    """Eight float32, int32 or int64 from a one-dimensional array or ``pointer`` of such numbers, from ``index`` on."""
+    vector = {types.float32: F32X8, types.int32: I32X8, types.int64: I64X8}[array.dtype]
 
     def codegen(context, builder, sig, args):
-        return _load(builder, _pointer(context, builder, sig.args[0], *args, _llvm(F32X8)), sig.args[0])
+        return _load(builder, _pointer(context, builder, sig.args[0], *args, _llvm(vector)), sig.args[0])
 
-    return F32X8(array, types.intp), codegen
+    return vector(array, types.intp), codegen
 
 
 @intrinsic
@@ -321,7 +325,7 @@ def equal4(typingctx, array, index, value):
     def codegen(context, builder, sig, args):
         word = ir.VectorType(ir.IntType(32), 4)
         four = _load(builder, _pointer(context, builder, sig.args[0], args[0], args[1], word), sig.args[0])
-        same = builder.icmp_signed("==", four, _spread_word(builder, builder.trunc(args[2], word.element), 4))
+        same = builder.icmp_signed("==", four, _spread(builder, Vector("i32", 4), builder.trunc(args[2], word.element)))
         return builder.zext(builder.bitcast(same, ir.IntType(4)), ir.IntType(64))
 
     return types.int64(array, types.intp, types.int64), codegen
@@ -596,65 +600,80 @@ def _permuted(builder: Any, vector: Any, places: Any) -> Any:
     return builder.bitcast(builder.call(fence, [builder.bitcast(found, floats)]), vector.type)
 
 
+@intrinsic
+def permuted(typingctx, vector, lanes):
+    """The lanes of eight float32 or int32, or of a mask of eight, that eight int32 from 0 to 7 name."""
+
+    def codegen(context, builder, sig, args):
+        if vector != MASK8:
+            return _permuted(builder, *args)
+        word = _llvm(I32X8)
+        return builder.icmp_signed(
+            "<", _permuted(builder, builder.sext(args[0], word), args[1]), ir.Constant(word, None)
+        )
+
+    return vector(vector, lanes), codegen
+
+
+@intrinsic
+def octal8(typingctx, digits):
+    """The eight lowest octal digits of an int32 as int32, the lowest first."""
+
+    def codegen(context, builder, sig, args):
+        word = _llvm(I32X8)
+        shifted = builder.lshr(_spread(builder, I32X8, args[0]), ir.Constant(word, [3 * k for k in range(8)]))
+        return builder.and_(shifted, ir.Constant(word, [7] * 8))
+
+    return I32X8(types.int32), codegen
+
+
 # For each mask of eight lanes, those that are set and then the others.
 _SET_FIRST = [sorted(range(8), key=lambda lane: mask >> lane & 1 == 0) for mask in range(256)]
 
 
-def _first_set(builder: Any, mask: Any) -> Any:
-    """The numbers of eight lanes, those that are set in the mask first."""
-    byte, word, wide = (ir.IntType(bits) for bits in (8, 32, 64))
-    row = ir.VectorType(byte, 8)
-    table = ir.Constant(ir.ArrayType(row, 256), [ir.Constant(row, order) for order in _SET_FIRST])
-    at = builder.zext(builder.bitcast(mask, byte), wide)
-    order = builder.load(builder.gep(cgutils.global_constant(builder, "set_first", table), [wide(0), at]))
-    return builder.zext(order, ir.VectorType(word, 8))
+@intrinsic
+def set_first(typingctx, bits):
+    """The numbers of eight lanes as int32, those whose bits are set first."""
 
+    def codegen(context, builder, sig, args):
+        byte, wide = ir.IntType(8), ir.IntType(64)
+        row = ir.VectorType(byte, 8)
+        table = ir.Constant(ir.ArrayType(row, 256), [ir.Constant(row, order) for order in _SET_FIRST])
+        at = builder.and_(args[0], wide(255))
+        order = builder.load(builder.gep(cgutils.global_constant(builder, "set_first", table), [wide(0), at]))
+        return builder.zext(order, _llvm(I32X8))
 
-def _links(context: Any, builder: Any, pointer_type: Any, links: Any, index: Any) -> Any:
-    """Eight int32 from ``index`` on of a ``pointer``; of None the numbers from ``index`` on."""
-    word = ir.VectorType(ir.IntType(32), 8)
-    if pointer_type == types.none:
-        return builder.add(_spread_word(builder, builder.trunc(index, word.element)), ir.Constant(word, list(range(8))))
-    at = _pointer(context, builder, pointer_type, links, index, word)
-    return _load(builder, at, pointer_type)
-
-
-def _spread_word(builder: Any, value: Any, lanes: int = 8) -> Any:
-    """An int32 in all lanes."""
-    word = ir.VectorType(value.type, lanes)
-    one = builder.insert_element(ir.Constant(word, ir.Undefined), value, value.type(0))
-    return builder.shuffle_vector(one, one, ir.Constant(ir.VectorType(ir.IntType(32), lanes), [0] * lanes))
+    return I32X8(types.int64), codegen
 
 
 @intrinsic
-def set_first(typingctx, mask, links, index):
-    """Eight int64: the int32 from ``index`` on of the ``pointer`` ``links`` as low words, those in the mask first."""
+def add_each(typingctx, words, number):
+    """Eight int32, to each of which the low half of an int64 is added."""
 
     def codegen(context, builder, sig, args):
-        link = _links(context, builder, sig.args[1], args[1], args[2])
-        return builder.zext(_permuted(builder, link, _first_set(builder, args[0])), _llvm(I64X8))
+        return builder.add(args[0], _spread(builder, I32X8, builder.trunc(args[1], ir.IntType(32))))
 
-    return I64X8(mask, links, types.intp), codegen
+    return I32X8(I32X8, types.int64), codegen
 
 
 @intrinsic
-def set_in_order(typingctx, mask, distances, links, index, order):
-    """``set_first`` in an order, an int32 with the lanes' numbers in three bits each, the first in the lowest.
-
-    The high words are the bits of the float32 distances, of which those in the mask are not NaN. If ``links`` is None,
-    the low words are the numbers from ``index`` on.
-    """
+def joined(typingctx, low, high):
+    """Eight int64: the bits of eight int32 below those of eight float32."""
 
     def codegen(context, builder, sig, args):
-        word = ir.VectorType(ir.IntType(32), 8)
-        lanes = builder.lshr(_spread_word(builder, args[4]), ir.Constant(word, [3 * k for k in range(8)]))
-        lanes, unset = builder.and_(lanes, ir.Constant(word, [7] * 8)), ir.Constant(word, [-1] * 8)
-        far = builder.select(args[0], builder.bitcast(args[1], word), unset)
-        far = _permuted(builder, far, lanes)
-        first = _first_set(builder, builder.icmp_signed("!=", far, unset))
-        link = _links(context, builder, sig.args[2], args[2], args[3])
-        link, far = _permuted(builder, link, _permuted(builder, lanes, first)), _permuted(builder, far, first)
         pairs = ir.Constant(ir.VectorType(ir.IntType(32), 16), [i // 2 + 8 * (i % 2) for i in range(16)])
-        return builder.bitcast(builder.shuffle_vector(link, far, pairs), _llvm(I64X8))
+        high = builder.bitcast(args[1], _llvm(I32X8))
+        return builder.bitcast(builder.shuffle_vector(args[0], high, pairs), _llvm(I64X8))
 
-    return I64X8(mask, distances, links, types.intp, types.int32), codegen
+    return I64X8(I32X8, F32X8), codegen
+
+
+@intrinsic
+def counting8(typingctx, first, step):
+    """Eight int64 from ``first`` on, each a step more than the previous one."""
+
+    def codegen(context, builder, sig, args):
+        first, step = (_spread(builder, I64X8, value) for value in args)
+        return builder.add(first, builder.mul(step, ir.Constant(_llvm(I64X8), list(range(8)))))
+
+    return I64X8(types.int64, types.int64), codegen

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
+from renderer.numerics.kinds import of_none
 from renderer.numerics.simd import (
     double_of,
     fabs,
@@ -62,9 +63,9 @@ from renderer.trace.ray_lanes import (
     put_slabs,
 )
 from renderer.trace.rays import ray_at
-from renderer.trace.stack_entry import child_of_entry, distance_of, octant_of
+from renderer.trace.stack_entry import octant_of
 from renderer.trace.starts.record import start_row
-from renderer.trace.stream import END, prefetch_block, prefetch_node
+from renderer.trace.stream import END, NO_DISTANCE, prefetch_block, prefetch_node, topmost, topmost_within
 from renderer.trace.ways import Ways
 
 # An object, int64: a tree as in ``layout``; the addresses of its mesh's vertices and faces; and, as float64 in the
@@ -84,9 +85,8 @@ TOP_NODES, INSTANCES, INSTANCE_COUNT, FACING, SCENE_WORDS = range(5)
 NUMBER_BITS = 32
 _NUMBER = (1 << NUMBER_BITS) - 1
 SLOT_BITS = NUMBER_BITS + 2
-# The entry on a ray's stack where it leaves an instance: the distance -inf, so that no limit passes over it.
+# The child on a ray's stack where it leaves an instance; its distance is NO_DISTANCE, so that no limit passes over it.
 _LEAVE = END + 1
-_LEFT = (-0x800000 << 32) | (_LEAVE & 0xFFFFFFFF)
 # A hit that is uncertain, once resolved, is within 2^-22 of its distance of its face (``intersect.DOUBT``). Boxes grow
 # by four times as much, as the distance counts along each axis alone.
 DISTANCE_ROOM = 2.0**-20
@@ -479,16 +479,13 @@ def _node_of(tree, prepared, r):
 
 
 @kernel
-def _resume(tree, rays, prepared, lanes, r):
+def _resume(tree, rays, prepared, lanes, r, any_hit):
     # rule: resume-in-scene
     integers, limit = prepared.integers, load(prepared.floats, LIMIT + r)
     top, number = load(integers, TOP + r), load(integers, _INSTANCE + r)
     while True:
-        top -= 1
-        entry = load(lanes.stacks, top)
-        if distance_of(entry) > limit:
-            continue
-        child = child_of_entry(entry)
+        top = of_none(any_hit, topmost_within, topmost)(lanes, top, limit)
+        child = np.int64(load(lanes.children, top))
         if child == END:
             break
         if child == _LEAVE:
@@ -501,7 +498,8 @@ def _resume(tree, rays, prepared, lanes, r):
             if not _may_enter(tree, prepared, r, ~child + 1):
                 continue
             number = ~child + 1
-            store(lanes.stacks, top, _LEFT)
+            store(lanes.distances, top, NO_DISTANCE)
+            store(lanes.children, top, np.int32(_LEAVE))
             top += 1
             _enter_instance(tree, rays, prepared, r, number)
             child = np.int64(0)

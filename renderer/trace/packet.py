@@ -12,7 +12,9 @@ import numpy as np
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.kinds import of_none
 from renderer.numerics.simd import (
+    add_each,
     count_bits,
+    joined,
     load,
     load8,
     lowest_bit,
@@ -20,10 +22,10 @@ from renderer.numerics.simd import (
     minimum,
     movemask,
     offset,
+    permuted,
     reduce_max,
     reduce_min,
     select,
-    set_in_order,
     splat8,
     store,
 )
@@ -46,6 +48,7 @@ from renderer.trace.ray_lanes import (
     nearest_in_leaf,
 )
 from renderer.trace.stack_entry import distance_of, octant_of
+from renderer.trace.walk import entered_in_order
 
 # A beam's slopes widen by 2^-18 of their size, four times the padding of a single ray's boxes, which covers that and
 # the five roundings between the two forms of the test; and by more than a slope loses below the normal float32. That is
@@ -227,9 +230,9 @@ def push_nearest_last(tree, node, meets, t0, order, stack, top):
     """Push the octants of a node in ``meets``, in the order at the word ``order`` of nodes; an entry has t0 above the
     octant's number. Returns the new top.
     """
-    order = load(tree.links, node * NODE_WORDS + order)
-    store(stack, top, set_in_order(meets, t0, None, node * 8, order))
-    return top + count_bits(movemask(meets))
+    octants, bits = entered_in_order(meets, load(tree.links, node * NODE_WORDS + order))
+    store(stack, top, joined(add_each(octants, node * 8), permuted(t0, octants)))
+    return top + count_bits(bits)
 
 
 @inlined

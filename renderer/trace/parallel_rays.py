@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import (
+    add_each,
     address,
     count_bits,
     equal4,
     float32_pointer,
+    int32_pointer,
     load,
     load8,
     lowest_bit,
@@ -64,6 +66,7 @@ from renderer.trace.walk import blocks_of, stack_size
 _MOST_NODES = 4
 # The rows of a group of eight rays, float32.
 _X, _Y, _H, _ALONG, _SLACK, _GROUP = 0, 8, 16, 24, 32, 40
+_BYTES = 8
 # Coordinates of rays that err by more could overflow; those that err by less are finite, and so is each middle.
 _TOO_FAR = np.float32(2.0**80)
 _NOWHERE = np.float32(np.inf)
@@ -84,7 +87,7 @@ class ParallelPointers(NamedTuple):
     boxes     the extents of the octants of a node
     live      the numbers of the rays that have hit nothing yet, and some that have
     in_doubt  for each ray whether a hit must be resolved, 1 or 0
-    entered   the places among the live rays of those that enter a leaf
+    entered   the places among the live rays of those that enter a leaf, int32
     waiting   the nodes that wait
     """
 
@@ -106,10 +109,9 @@ def new_parallel_scratch(depth: int, rays: int) -> ParallelScratch:
 def parallel_pointers(scratch):
     """The ``ParallelPointers`` into a ``ParallelScratch``."""
     floats, integers, rays = float32_pointer(address(scratch.floats)), pointer(scratch.integers), scratch.rays
-    live, in_doubt, entered, waiting = (
-        integers, offset(integers, rays + 8), offset(integers, 2 * (rays + 8)), offset(integers, 3 * (rays + 8)),
-    )  # fmt: skip
-    return ParallelPointers(floats, offset(floats, rays // 8 * _GROUP), live, in_doubt, entered, waiting)
+    in_doubt, waiting = offset(integers, rays + 8), offset(integers, 3 * (rays + 8))
+    entered = int32_pointer(address(scratch.integers) + 2 * _BYTES * (rays + 8))
+    return ParallelPointers(floats, offset(floats, rays // 8 * _GROUP), integers, in_doubt, entered, waiting)
 
 
 class _Seen(NamedTuple):
@@ -170,7 +172,7 @@ def _find_rays(parallel, seen, box):
         mask = enter(box, load8(at, _X), load8(at, _Y), load8(at, _H), load8(at, _ALONG))
         bits = movemask(mask)
         if bits != 0:
-            store(parallel.entered, found, set_first(mask, None, 8 * group))
+            store(parallel.entered, found, add_each(set_first(bits), 8 * group))
             found += count_bits(bits)
     return found
 
@@ -183,7 +185,7 @@ def _test_leaf(tree, rays, found, parallel, seen, leaf, some):
         faces = see_faces(tree, block * BLOCK_WORDS, seen.shear, seen.projection, widen(seen.reach), widen(seen.error))
         used = ~equal4(tree.faces, block * BLOCK_FACES, np.int64(-1))
         for k in range(some):
-            place = load(parallel.entered, k)
+            place = np.int64(load(parallel.entered, k))
             at, i = offset(parallel.places, (place >> 3) * _GROUP + (place & 7)), load(parallel.live, place)
             bits = may_hit(faces, load(at, _X), load(at, _Y), load(at, _ALONG)) & used
             # A ray does not hit the face that it leaves.

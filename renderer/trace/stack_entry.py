@@ -1,7 +1,5 @@
 """Entries of a stack of octants, int64: the entry distance of a ray above the 32 bits of the octant."""
 
-import numpy as np
-
 from renderer.jit.decorators import inlined
 from renderer.numerics.simd import bits_float
 
@@ -18,15 +16,3 @@ def distance_of(entry):
 def octant_of(entry):
     """The number of the octant, 0 or more."""
     return entry & _LOW_WORD
-
-
-@inlined
-def child_of_entry(entry):
-    """The child of an entry that has one in place of an octant number: int32, perhaps negative."""
-    return np.int64(np.int32(entry & _LOW_WORD))
-
-
-@inlined
-def with_child(entry, child):
-    """The entry with a child in place of its number."""
-    return ((entry >> 32) << 32) | child & _LOW_WORD

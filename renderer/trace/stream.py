@@ -11,16 +11,19 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined
+from renderer.numerics.kinds import of_none
 from renderer.numerics.simd import (
     count_bits,
+    counting8,
     load,
+    load8,
     lowest_bit,
     minimum,
     movemask,
     offset,
+    permuted,
     prefetch,
     set_first,
-    set_in_order,
     splat4,
     splat8,
     store,
@@ -31,6 +34,7 @@ from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CACHE_LINE, CHILDREN
 from renderer.trace.ray_lanes import (
     CHILD,
     DIRECTION_Z,
+    FACE,
     LARGEST,
     LIMIT,
     LOWER,
@@ -48,13 +52,12 @@ from renderer.trace.ray_lanes import (
     shear_of,
     slabs_of,
 )
-from renderer.trace.stack_entry import child_of_entry, distance_of, with_child
-from renderer.trace.walk import first_block
+from renderer.trace.walk import entered_in_order, first_block
 
-# The entry at the bottom of each ray's stack. END is the code of no leaf. The distance -inf is beyond no limit, not
-# even beyond NaN, so no ray goes below its stack.
+# The child at the bottom of each ray's stack, the code of no leaf. Its distance is that of no octant: beyond no limit,
+# not even beyond NaN, so no ray goes below its stack.
 END = -(1 << 31)
-_BOTTOM = (-0x800000 << 32) | (END & 0xFFFFFFFF)
+NO_DISTANCE = np.float32(-np.inf)
 _LINE = CACHE_LINE // 4
 
 
@@ -76,7 +79,8 @@ def prefetch_block(blocks, block, wide):
 class Lanes(NamedTuple):
     """Rays under way, as pointers.
 
-    stacks, stack_size        the stacks of all lanes, and the entries of one
+    distances, children       the stacks of all lanes: children, and where searches for closest hits enter their boxes
+    stack_size                the entries of one stack
     at_node, at_leaf, at_end  lists of the lanes of rays at a node, at a leaf and at END
     bits, must_resolve, hits  of a round, for each ray in the list of leaves: the bits of the triangles hit, of those
                               uncertain that must be resolved, and t, u, v and w
@@ -84,7 +88,8 @@ class Lanes(NamedTuple):
                               that are free: eight lanes are taken together
     """
 
-    stacks: Any
+    distances: Any
+    children: Any
     stack_size: int
     at_node: Any
     at_leaf: Any
@@ -124,18 +129,27 @@ LANE_INTEGERS, LANE_DOUBLES = 5 * _LANES + HALF_GROUPS + 1, 4 * BLOCK_FACES * _L
 
 
 @inlined
-def make_lanes(integers, doubles, stack_size):
-    """Lanes in the given memory; the stacks, ``stack_size`` entries each, follow the LANE_INTEGERS other words."""
+def make_lanes(integers, doubles, distances, children, stack_size):
+    """Lanes in the given memory."""
     return Lanes(
-        offset(integers, LANE_INTEGERS), stack_size, integers, offset(integers, _LANES), offset(integers, 2 * _LANES),
+        distances, children, stack_size, integers, offset(integers, _LANES), offset(integers, 2 * _LANES),
         offset(integers, 3 * _LANES), offset(integers, 4 * _LANES), doubles, offset(integers, 5 * _LANES),
     )  # fmt: skip
 
 
 @inlined
-def clear_lanes(lanes):
-    """Free all lanes."""
+def clear_lanes(lanes, rays):
+    """Free all lanes, of which so many rays will take some."""
     store(lanes.left, HALF_GROUPS, (1 << HALF_GROUPS) - 1)
+    end_stacks(lanes, minimum(rays + 7, _LANES))
+
+
+@inlined
+def end_stacks(lanes, count):
+    """Write the bottoms of the stacks of the first lanes, ``count`` of them."""
+    for bottom in range(0, count * lanes.stack_size, lanes.stack_size):
+        store(lanes.distances, bottom, NO_DISTANCE)
+        store(lanes.children, bottom, np.int32(END))
 
 
 @inlined
@@ -150,31 +164,27 @@ def begin_rays(tree, rays, prepared, lanes, queue, counts):
         half = lowest_bit(free)
         store(lanes.left, HALF_GROUPS, free & (free - 1))
         some, r = minimum(queue.count - following, 8), lane_of(half >> 1, 8 * (half & 1))
-        prepare_eight(rays, prepared, r, offset(queue.numbers, following))
+        numbers = offset(queue.numbers, following)
+        prepare_eight(rays, prepared, r, numbers)
+        begin_eight(tree, rays, prepared, lanes, r, numbers, some)
         store(lanes.left, half, some)
-        for k in range(some):
-            begin_ray(tree, rays, prepared, lanes, r + k, load(queue.numbers, following + k))
-            store(lanes.at_node, nodes + k, r + k)
+        store(lanes.at_node, nodes, counting8(r, 1))
         following, nodes = following + some, nodes + some
     return following, LaneCounts(nodes, counts.leaves, counts.ends)
 
 
 @inlined
-def begin_ray(tree, rays, prepared, lanes, r, number):
-    """Start the prepared ray in lane ``r`` at the root."""
-    tree.ways.begin(tree, rays, prepared, r, number)
-    integers, bottom = prepared.integers, stack_of(lanes, r)
-    store(integers, CHILD + r, 0)
-    store(integers, TOP + r, bottom + 1)
-    store(integers, NUMBER + r, number)
-    store(integers, UNRESOLVED + r, 0)
-    store(lanes.stacks, bottom, _BOTTOM)
-
-
-@inlined
-def stack_of(lanes, r):
-    """The offset of the stack of lane ``r`` in ``stacks``."""
-    return lane_index(r) * lanes.stack_size
+def begin_eight(tree, rays, prepared, lanes, r, numbers, count):
+    """Start the first ``count`` of eight prepared rays, numbered at ``numbers``, in the lanes from ``r`` on at the
+    root.
+    """
+    integers, none = prepared.integers, counting8(0, 0)
+    store(integers, CHILD + r, none)
+    store(integers, TOP + r, counting8(lane_index(r) * lanes.stack_size + 1, lanes.stack_size))
+    store(integers, NUMBER + r, load8(numbers, 0))
+    store(integers, UNRESOLVED + r, none)
+    for k in range(count):
+        tree.ways.begin(tree, rays, prepared, r + k, load(numbers, k))
 
 
 @inlined
@@ -187,39 +197,45 @@ def end_ray(lanes, r):
 
 
 @inlined
-def wait_octant(prepared, lanes, r, entry, child):
-    """Push an octant onto the stack of ray ``r``: the distance of ``entry``, and its child."""
+def wait_octant(prepared, lanes, r, distance, child):
+    """Push an octant onto the stack of ray ``r``."""
     top = load(prepared.integers, TOP + r)
-    store(lanes.stacks, top, with_child(entry, child))
+    store(lanes.distances, top, distance)
+    store(lanes.children, top, np.int32(child))
     store(prepared.integers, TOP + r, top + 1)
 
 
 @inlined
-def nearest_last(meets, distances, links, base, slabs):
-    """Entries of the octants that a ray enters, the nearest last; others may follow."""
-    return set_in_order(meets, distances, links, base + CHILDREN, order_for(links, base, slabs))
+def _push_in_order(lanes, top, meets, distances, links, base, slabs):
+    """Push the octants that a ray enters, the nearest last. Returns how many."""
+    octants, bits = entered_in_order(meets, order_for(links, base, slabs))
+    store(lanes.distances, top, permuted(distances, octants))
+    store(lanes.children, top, permuted(load8(links, base + CHILDREN), octants))
+    return count_bits(bits)
 
 
 @inlined
-def unsorted(meets, distances, links, base, slabs):
-    """``nearest_last`` for queries that need not come to near octants first: in any order, all with the distance 0."""
-    return set_first(meets, links, base + CHILDREN)
+def _push_children(lanes, top, meets, distances, links, base, slabs):
+    """``_push_in_order`` for queries that need not come to near octants first: in any order, without distances."""
+    bits = movemask(meets)
+    store(lanes.children, top, permuted(load8(links, base + CHILDREN), set_first(bits)))
+    return count_bits(bits)
 
 
 @inlined
-def meet_nodes(tree, rays, lanes, count, order):
-    """For each of ``count`` rays, push the octants of its node that it enters, by ``nearest_last`` or ``unsorted``.
+def meet_nodes(tree, rays, lanes, count, any_hit):
+    """For each of ``count`` rays, push the octants of its node that it enters; in any order unless ``any_hit`` is None.
 
     No branch: all eight are written, and the top moves by the number entered.
     """
+    push = of_none(any_hit, _push_in_order, _push_children)
     for k in range(count):
         r = load(lanes.at_node, k)
         top, (nodes, links, base) = load(rays.integers, TOP + r), tree.ways.node_of(tree, rays, r)
         lower, upper = splat8(load(rays.floats, LOWER + r)), splat8(load(rays.floats, LIMIT + r))
         slabs = slabs_of(rays, r)
         t0, meets = meet_boxes(nodes, base, slabs, lower, upper)
-        store(lanes.stacks, top, order(meets, t0, links, base, slabs))
-        store(rays.integers, TOP + r, top + count_bits(movemask(meets)))
+        store(rays.integers, TOP + r, top + push(lanes, top, meets, t0, links, base, slabs))
 
 
 @inlined
@@ -234,21 +250,35 @@ def node_in_tree(tree, prepared, r):
 
 
 @inlined
-def resume(tree, rays, prepared, lanes, r):
-    """Pop the next child of ray ``r`` that is not beyond its best hit, and return it."""
-    return tree.ways.resume(tree, rays, prepared, lanes, r)
+def resume(tree, rays, prepared, lanes, r, any_hit):
+    """Pop the next child of ray ``r`` that is not beyond its best hit, and return it; the topmost unless ``any_hit`` is
+    None.
+    """
+    return tree.ways.resume(tree, rays, prepared, lanes, r, any_hit)
 
 
 @inlined
-def resume_in_tree(tree, sources, rays, lanes, r):
+def topmost_within(lanes, top, limit):
+    """The place of the topmost entry below ``top`` that is not beyond a limit."""
+    top -= 1
+    while load(lanes.distances, top) > limit:
+        top -= 1
+    return top
+
+
+@inlined
+def topmost(lanes, top, limit):
+    """``topmost_within`` where entries have no distances."""
+    return top - 1
+
+
+@inlined
+def resume_in_tree(tree, sources, rays, lanes, r, any_hit):
     """``resume`` in a mesh."""
     # rule: resume-limit
-    limit, top = load(rays.floats, LIMIT + r), load(rays.integers, TOP + r) - 1
-    entry = load(lanes.stacks, top)
-    while distance_of(entry) > limit:
-        top -= 1
-        entry = load(lanes.stacks, top)
-    child = child_of_entry(entry)
+    limit, top = load(rays.floats, LIMIT + r), load(rays.integers, TOP + r)
+    top = of_none(any_hit, topmost_within, topmost)(lanes, top, limit)
+    child = np.int64(load(lanes.children, top))
     store(rays.integers, CHILD + r, child)
     store(rays.integers, TOP + r, top)
     if child >= 0:
@@ -259,8 +289,10 @@ def resume_in_tree(tree, sources, rays, lanes, r):
 
 
 @inlined
-def meet_leaves(tree, rays, lanes, count):
-    """Compute the hits of each of ``count`` rays in the first block of its leaf."""
+def meet_leaves(tree, rays, lanes, count, any_hit):
+    """Compute the hits of each of ``count`` rays in the first block of its leaf; unless ``any_hit`` is None, only what
+    ``take_any`` reads.
+    """
     for k in range(count):
         r = load(lanes.at_leaf, k)
         base, shear = first_block(load(rays.integers, CHILD + r)) * BLOCK_WORDS, shear_of(rays, r)
@@ -270,11 +302,12 @@ def meet_leaves(tree, rays, lanes, count):
         within = movemask((planes.t >= splat4(t_min)) & (planes.t <= splat4(t_max)))
         store(lanes.bits, k, seen & ~planes.uncertain & within)
         store(lanes.must_resolve, k, planes.must_resolve)
-        hits = 4 * BLOCK_FACES * k
-        store(lanes.hits, hits, planes.t)
-        store(lanes.hits, hits + BLOCK_FACES, edges.e1)
-        store(lanes.hits, hits + 2 * BLOCK_FACES, edges.e2)
-        store(lanes.hits, hits + 3 * BLOCK_FACES, edges.determinant)
+        hits = offset(lanes.hits, 4 * BLOCK_FACES * k)
+        if any_hit is None:
+            store(hits, 0, planes.t)
+            store(hits, BLOCK_FACES, edges.e1)
+            store(hits, 2 * BLOCK_FACES, edges.e2)
+        store(hits, 3 * BLOCK_FACES, edges.determinant)
 
 
 @inlined
@@ -303,7 +336,23 @@ def take_hits(tree, rays, lanes, k):
 
 
 @inlined
-def leave_leaf(tree, sources, rays, lanes, r):
+def take_any(tree, rays, lanes, k):
+    """``take_hits`` for any hit, of which only the face is kept."""
+    r, bits = load(lanes.at_leaf, k), load(lanes.bits, k)
+    store(rays.integers, UNRESOLVED + r, load(rays.integers, UNRESOLVED + r) | load(lanes.must_resolve, k))
+    block = first_block(load(rays.integers, CHILD + r))
+    while bits != 0:
+        i = lowest_bit(bits)
+        bits &= bits - 1
+        w = load(lanes.hits, 4 * BLOCK_FACES * k + 3 * BLOCK_FACES + i)
+        if tree.ways.admits(tree, w, load(rays.doubles, DIRECTION_Z + r)):
+            store(rays.integers, FACE + r, np.int64(face_in(tree, block * BLOCK_FACES + i)))
+            return True
+    return False
+
+
+@inlined
+def leave_leaf(tree, sources, rays, lanes, r, any_hit):
     """Choose the next child of ray ``r`` at a leaf: the rest of its blocks, else one from its stack. Returns it."""
     child = load(rays.integers, CHILD + r)
     # rule: rest-of-leaf
@@ -312,29 +361,31 @@ def leave_leaf(tree, sources, rays, lanes, r):
         child -= MAX_LEAF_BLOCKS - 1
         store(rays.integers, CHILD + r, child)
         return child
-    return resume(tree, sources, rays, lanes, r)
+    return resume(tree, sources, rays, lanes, r, any_hit)
 
 
 @inlined
 def list_lane(lanes, r, child, counts):
-    """Append lane ``r`` to the list of nodes, leaves or ends, by its next child. Returns the ``LaneCounts``.
-
-    No branch: the lane is written to all three.
-    """
+    """Append lane ``r`` to the list of nodes, leaves or ends, by its next child. Returns the ``LaneCounts``."""
     nodes, leaves, ends = counts.nodes, counts.leaves, counts.ends
-    store(lanes.at_node, nodes, r)
+    # ``resume`` has branched here too, and LLVM makes one branch of both.
+    if child >= 0:
+        store(lanes.at_node, nodes, r)
+        return LaneCounts(nodes + 1, leaves, ends)
+    # No branch: the lane is written to both.
     store(lanes.at_leaf, leaves, r)
     store(lanes.at_end, ends, r)
-    at_node, at_end = np.int64(child >= 0), np.int64(child == END)
-    return LaneCounts(nodes + at_node, leaves + (1 - at_node - at_end), ends + at_end)
+    at_end = np.int64(child == END)
+    return LaneCounts(nodes, leaves + (1 - at_end), ends + at_end)
 
 
 @inlined
-def run_lanes(tree, rays, prepared, lanes, counts, queue, most_rounds, query, enter, meet, take, finish):
+def run_lanes(tree, rays, prepared, lanes, counts, queue, most_rounds, query, any_hit, enter, meet, take, finish):
     """Trace the rays in lanes and those of a queue to their ends; none of the queue begins after ``most_rounds``
     rounds.
 
     query   what the four kernels read
+    any_hit as of ``meet_nodes``
     enter   enter(tree, query, lanes, count): ``meet_nodes`` of each ray at a node
     meet    meet(tree, query, lanes, count): compute the hits of each ray at a leaf in the first block of its leaf
     take    take(tree, query, k): take the hits of the k-th of them; returns whether the ray ends
@@ -355,13 +406,13 @@ def run_lanes(tree, rays, prepared, lanes, counts, queue, most_rounds, query, en
         enter(tree, query, lanes, entered)
         for k in range(entered):
             r = load(lanes.at_node, k)
-            counts = list_lane(lanes, r, resume(tree, rays, prepared, lanes, r), counts)
+            counts = list_lane(lanes, r, resume(tree, rays, prepared, lanes, r, any_hit), counts)
         # Take the rays at leaves one block on.
         entered, counts = counts.leaves, LaneCounts(counts.nodes, np.int64(0), counts.ends)
         meet(tree, query, lanes, entered)
         for k in range(entered):
             r, ends = load(lanes.at_leaf, k), take(tree, query, k)
-            counts = list_lane(lanes, r, END if ends else leave_leaf(tree, rays, prepared, lanes, r), counts)
+            counts = list_lane(lanes, r, END if ends else leave_leaf(tree, rays, prepared, lanes, r, any_hit), counts)
         for k in range(counts.ends):
             r = load(lanes.at_end, k)
             rounds += finish(tree, query, r)

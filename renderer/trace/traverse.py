@@ -11,6 +11,7 @@ from renderer.numerics.simd import (
     address,
     float32_pointer,
     float64_pointer,
+    int32_pointer,
     load,
     lowest_bit,
     minimum,
@@ -37,7 +38,7 @@ from renderer.trace.ray_lanes import (
 )
 from renderer.trace.rays import HitPointers, RayPointers, first_bad_ray, ray_at
 from renderer.trace.single import search_carefully, write_best
-from renderer.trace.stack_entry import octant_of
+from renderer.trace.stack_entry import distance_of, octant_of
 from renderer.trace.starts.cone import HOLDERS_WORDS
 from renderer.trace.starts.record import EDGE
 from renderer.trace.stream import (
@@ -48,18 +49,17 @@ from renderer.trace.stream import (
     LaneCounts,
     Lanes,
     Queue,
-    begin_ray,
+    begin_eight,
     clear_lanes,
+    end_stacks,
     list_lane,
     make_lanes,
     meet_leaves,
     meet_nodes,
-    nearest_last,
     resume,
     run_lanes,
-    stack_of,
+    take_any,
     take_hits,
-    unsorted,
     wait_octant,
 )
 from renderer.trace.trees import call_pointers
@@ -119,7 +119,9 @@ def scratch_pointers(scratch, starts):
     floats, doubles = float32_pointer(start + _BYTES * _FLOATS), float64_pointer(start + _BYTES * _DOUBLES)
     size, integers = load(words, _STACK_SIZE), offset(words, _INTEGERS)
     lane_integers = offset(integers, _PREPARED)
-    lanes = make_lanes(lane_integers, offset(doubles, _PREPARED), size)
+    stacks = start + _BYTES * (_INTEGERS + _PREPARED + LANE_INTEGERS)
+    distances, children = float32_pointer(stacks), int32_pointer(stacks + _BYTES // 2 * GROUPS * WIDTH * size)
+    lanes = make_lanes(lane_integers, offset(doubles, _PREPARED), distances, children, size)
     packet_stack = offset(lane_integers, LANE_INTEGERS + GROUPS * WIDTH * size)
     return ScratchPointers(
         Prepared(floats, doubles, integers, starts), lanes, packet_stack, offset(packet_stack, size),
@@ -148,7 +150,7 @@ class _Query(NamedTuple):
 
 @inlined
 def _finish(tree, query, r):
-    """Write the hit of the ray in lane ``r``. If a hit must be resolved, a careful search on its stack comes first.
+    """Write the hit of the ray in lane ``r``. If a hit must be resolved, a careful search comes first.
 
     Returns the number of rounds that take as long as that search.
     """
@@ -157,8 +159,9 @@ def _finish(tree, query, r):
     i, (slack, _) = load(prepared.integers, NUMBER + r), start_of(prepared, r)
     # rule: resolve-uncertain
     if load(prepared.integers, UNRESOLVED + r) != 0 or slack == EDGE:
-        stack = offset(scratch.lanes.stacks, stack_of(scratch.lanes, r))
-        careful = search_carefully(tree, rays, i, stack, scratch.holders, query.any_hit is not None)
+        # No packet is under way.
+        stack, any_hit = scratch.packet_stack, query.any_hit is not None
+        careful = search_carefully(tree, rays, i, stack, scratch.holders, any_hit)
         best, steps = careful.best, careful.steps
     largest, dz = load(prepared.doubles, LARGEST + r), load(prepared.doubles, DIRECTION_Z + r)
     write_best(tree, rays, query.found, i, best, slack, largest, dz, query.any_hit is not None)
@@ -167,17 +170,18 @@ def _finish(tree, query, r):
 
 @inlined
 def _enter(tree, query, lanes, count):
-    meet_nodes(tree, query.scratch.prepared, lanes, count, of_none(query.any_hit, nearest_last, unsorted))
+    meet_nodes(tree, query.scratch.prepared, lanes, count, query.any_hit)
 
 
 @inlined
 def _meet(tree, query, lanes, count):
-    meet_leaves(tree, query.scratch.prepared, lanes, count)
+    meet_leaves(tree, query.scratch.prepared, lanes, count, query.any_hit)
 
 
 @inlined
 def _take(tree, query, k):
-    hit = take_hits(tree, query.scratch.prepared, query.scratch.lanes, k)
+    take = of_none(query.any_hit, take_hits, take_any)
+    hit = take(tree, query.scratch.prepared, query.scratch.lanes, k)
     return query.any_hit is not None and hit
 
 
@@ -189,8 +193,9 @@ def _run(tree, query, counts, queue):
     """
     scratch = query.scratch
     return run_lanes(
-        tree, query.rays, scratch.prepared, scratch.lanes, counts, queue, _WORK, query, _enter, _meet, _take, _finish
-    )
+        tree, query.rays, scratch.prepared, scratch.lanes, counts, queue, _WORK, query, query.any_hit,
+        _enter, _meet, _take, _finish,
+    )  # fmt: skip
 
 
 @inlined
@@ -202,7 +207,7 @@ def _no_lanes():
 def _trace_stream(tree, query, following, count):
     """Trace the rays in ``scratch.waiting`` from ``following`` to ``count``; returns the first that still waits."""
     scratch = query.scratch
-    clear_lanes(scratch.lanes)
+    clear_lanes(scratch.lanes, count - following)
     for k in range(count, count + WIDTH):
         store(scratch.waiting, k, load(scratch.waiting, count - 1))
     return _run(tree, query, _no_lanes(), Queue(scratch.waiting, following, count))[0]
@@ -215,15 +220,17 @@ def _hand_over(tree, query, top, unresolved):
     Returns the number of rounds.
     """
     scratch, prepared, lanes = query.scratch, query.scratch.prepared, query.scratch.lanes
+    end_stacks(lanes, WIDTH)
+    for r in range(0, WIDTH, 8):
+        begin_eight(tree, query.rays, prepared, lanes, r, offset(prepared.integers, NUMBER + r), 8)
     for r in range(WIDTH):
-        begin_ray(tree, query.rays, prepared, lanes, r, load(prepared.integers, NUMBER + r))
         store(prepared.integers, UNRESOLVED + r, (unresolved >> r) & 1)
     for k in range(top):
         entry = load(scratch.packet_stack, k)
         child, at_ = child_of(tree, octant_of(entry))
         meeting = meet_octant(tree.nodes, prepared, at_)
         while meeting != 0:
-            wait_octant(prepared, lanes, lowest_bit(meeting), entry, child)
+            wait_octant(prepared, lanes, lowest_bit(meeting), distance_of(entry), child)
             meeting &= meeting - 1
     counts = _no_lanes()
     for r in range(WIDTH):
@@ -231,7 +238,7 @@ def _hand_over(tree, query, top, unresolved):
             store(prepared.integers, UNRESOLVED + r, 0)
             _finish(tree, query, r)
         else:
-            counts = list_lane(lanes, r, resume(tree, query.rays, prepared, lanes, r), counts)
+            counts = list_lane(lanes, r, resume(tree, query.rays, prepared, lanes, r, query.any_hit), counts)
     return _run(tree, query, counts, Queue(scratch.waiting, np.int64(0), np.int64(0)))[1]
 
 

@@ -7,7 +7,7 @@ it costs no more than a loop of its own.
 import numpy as np
 
 from renderer.jit.decorators import inlined
-from renderer.numerics.simd import load, lowest_bit, store
+from renderer.numerics.simd import load, lowest_bit, movemask, octal8, permuted, set_first, store
 from renderer.trace.layout import CHILDREN, LEAF_BITS, MAX_LEAF_BLOCKS, NODE_WORDS
 
 
@@ -73,6 +73,14 @@ def push_in_order(tree, node, bits, order, stack, top):
         store(stack, top, child_in(tree, node, octant))
         top += bits >> octant & 1
     return top
+
+
+@inlined
+def entered_in_order(meets, order):
+    """The octants of a mask in an order and then others, eight int32; and the bits of the mask in that order."""
+    octants = octal8(order)
+    bits = movemask(permuted(meets, octants))
+    return permuted(octants, set_first(bits)), bits
 
 
 @inlined

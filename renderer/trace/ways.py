@@ -17,7 +17,7 @@ class Ways(NamedTuple):
     enter            enter(tree, node, single, upper): ``single_ray.enter_node`` up to a distance
     begin            begin(tree, rays, prepared, r, number): what a lane keeps of a ray beside ``ray_lanes.prepare_ray``
     node_of          node_of(tree, prepared, r): nodes, links and the place of the node that a lane is at
-    resume           resume(tree, rays, prepared, lanes, r): ``stream.resume``
+    resume           resume(tree, rays, prepared, lanes, r, any_hit): ``stream.resume``
     may_hit          may_hit(tree, place, mask, ignored): whether a ray with that mask, which ignores one instance, may
                      hit the faces of a block, or below a node
     admits           admits(tree, w, dz): whether a hit counts from the side on which the signs of its w and the ray's

@@ -6,8 +6,10 @@ from cases import cases
 from numba import njit
 
 from renderer.numerics.simd import (
+    add_each,
     bits_float,
     broadcast_like,
+    counting8,
     double_of,
     equal4,
     fabs,
@@ -16,6 +18,7 @@ from renderer.numerics.simd import (
     gather8,
     int32_pointer,
     is_negative,
+    joined,
     load,
     load4,
     load8,
@@ -25,10 +28,11 @@ from renderer.numerics.simd import (
     minimum,
     movemask,
     narrow,
+    octal8,
+    permuted,
     pointer,
     select,
     set_first,
-    set_in_order,
     splat4,
     splat8,
     square_root,
@@ -175,39 +179,56 @@ def test_pointers_from_addresses():
 
 
 @njit
-def order_octants(distances, links, limit, order, out, numbers):
+def put_in_order(distances, links, limit, order, out, numbers):
     octants = load8(distances, 0)
-    store(out, 1, set_in_order(octants <= splat8(limit), octants, pointer(links), 2, order))
-    store(numbers, 1, set_in_order(octants <= splat8(limit), octants, None, 40, order))
+    lanes = octal8(order)
+    bits = movemask(permuted(octants <= splat8(limit), lanes))
+    lanes = permuted(lanes, set_first(bits))
+    store(out, 1, joined(permuted(load8(links, 2), lanes), permuted(octants, lanes)))
+    store(numbers, 1, add_each(lanes, 40))
+    return bits
 
 
 @cases("seed", range(200))
-def test_octants_come_in_any_order(seed):
-    """Any number of them, among them equal distances, -0.0 and infinity; what is not met comes last."""
+def test_lanes_come_in_any_order_with_those_of_a_mask_first(seed):
+    """Any number of them, among them equal distances, -0.0 and infinity."""
     rng = np.random.default_rng(seed)
     distances = rng.choice([0.0, -0.0, np.inf, 1e-45, 2.5, np.nan, *rng.uniform(0, 9, 8)], 8).astype(np.float32)
     links = rng.integers(-(2**31), 2**31, 10, dtype=np.int32)
     places, limit = rng.permutation(8), np.float32(rng.choice([-1.0, 0.0, 3.0, np.inf]))
-    (out, numbers), order = np.full((2, 10), 77), sum(int(place) << 3 * k for k, place in enumerate(places))
-    order_octants(distances, links, limit, np.int32(order), out, numbers)
+    out, numbers, order = np.full(10, 77), np.full(10, 77, np.int32), sum(int(p) << 3 * k for k, p in enumerate(places))
+    bits = put_in_order(distances, links, limit, np.int32(order), out, numbers)
     met = [place for place in places.tolist() if distances[place] <= limit]
-    for found, low in ((out, links[2:]), (numbers, np.arange(40, 48, dtype=np.int32))):
-        expected = np.array([low, distances.view(np.int32)]).T.copy().view(np.int64)[met].ravel()
-        assert found[[0, -1]].tolist() == [77, 77] and found[1 : 1 + len(met)].tolist() == expected.tolist()
+    assert bits == sum(1 << k for k, place in enumerate(places) if distances[place] <= limit)
+    pairs = np.array([links[2:], distances.view(np.int32)]).T.copy().view(np.int64)[met].ravel()
+    assert out[[0, -1]].tolist() == [77, 77] and out[1 : 1 + len(met)].tolist() == pairs.tolist()
+    assert numbers[[0, -1]].tolist() == [77, 77] and numbers[1 : 1 + len(met)].tolist() == [40 + p for p in met]
 
 
 @njit
-def gather_octants(distances, links, limit, out):
-    store(out, 1, set_first(load8(distances, 0) <= splat8(limit), pointer(links), 2))
+def put_set_first(bits, out):
+    store(out, 1, set_first(bits))
 
 
-def test_octants_of_every_mask_come_first():
-    links, out = np.array([9, 9, -1, 5, -(2**31), 2**31 - 1, 0, 7, -7, 1], np.int32), np.full(10, 77)
+def test_lanes_of_every_mask_come_first():
+    """Bits above the eight are not read."""
+    out = np.full(10, 77, np.int32)
     for mask in range(256):
-        distances = np.where(mask >> np.arange(8) & 1, 1.0, np.nan).astype(np.float32)
-        gather_octants(distances, links, np.float32(2.0), out)
-        expected = links[2:][distances == 1.0].view(np.uint32).tolist()
-        assert out[[0, -1]].tolist() == [77, 77] and out[1 : 1 + len(expected)].tolist() == expected
+        put_set_first(mask | 1 << 40, out)
+        expected = [k for k in range(8) if mask >> k & 1] + [k for k in range(8) if not mask >> k & 1]
+        assert out.tolist() == [77, *expected, 77]
+
+
+@njit
+def count_on(first, step, longs, out):
+    store(out, 1, counting8(first, step))
+    store(out, 11, load8(longs, 1))
+
+
+def test_numbers_in_equal_steps_and_loaded_ones():
+    longs, out = np.random.default_rng(0).integers(-(2**63), 2**63 - 1, 9), np.full(20, 77)
+    count_on(2**40, -(2**35), longs, out)
+    assert out.tolist() == [77, *(2**40 - 2**35 * k for k in range(8)), 77, 77, *longs[1:], 77]
 
 
 @njit

@@ -8,7 +8,6 @@ from renderer.jit.decorators import kernel
 from renderer.mesh.shapes import icosphere
 from renderer.numerics.simd import pointer
 from renderer.trace.layout import CHILDREN
-from renderer.trace.stack_entry import child_of_entry, distance_of, with_child
 from renderer.trace.trees import tree_pointers
 from renderer.trace.walk import push_in_order, stack_size
 
@@ -30,15 +29,3 @@ def test_octants_are_pushed_in_their_order_and_within_the_stack(bits):
     expected = [int(TREE.links[CHILDREN + k]) for k in order if bits >> k & 1]
     assert stack[top:found].tolist() == expected
     assert (stack[:top] == GUARD).all() and (stack[stack_size(TREE.depth) :] == GUARD).all()
-
-
-@kernel
-def _parts(entry, child):
-    changed = with_child(entry, child)
-    return distance_of(changed), child_of_entry(changed)
-
-
-@cases("child", [0, 5, 2**31 - 1, -1, -(2**31)])
-def test_an_entry_keeps_its_distance_and_gets_any_child(child):
-    entry = int(np.float32(2.5).view(np.int32)) << 32 | 7
-    assert _parts(entry, child) == (2.5, child)

@@ -25,9 +25,9 @@ def _along(matrix, row, x, y, z):
     return x * load(m, 0) + (y * load(m, 1) + (z * load(m, 2) + load(m, 3)))
 """
 _LEFT_IN_FRAME = """
-def _resume(tree, rays, prepared, lanes, r):
+def _resume(tree, rays, prepared, lanes, r, any_hit):
     left = load(prepared.integers, _INSTANCE + r)
-    child = sound(tree, rays, prepared, lanes, r)
+    child = sound(tree, rays, prepared, lanes, r, any_hit)
     if left != 0 and load(prepared.integers, _INSTANCE + r) == 0:
         ray, _ = ray_at(rays, load(prepared.integers, NUMBER + r))
         instance, words = _instance(tree, left)
