@@ -337,16 +337,15 @@ def take_hits(tree, rays, lanes, k):
 
 @inlined
 def take_any(tree, rays, lanes, k):
-    """``take_hits`` for any hit, of which only the face is kept."""
+    """``take_hits`` for any hit, of which only that there is one is kept: reading its face would cost a twelfth."""
     r, bits = load(lanes.at_leaf, k), load(lanes.bits, k)
     store(rays.integers, UNRESOLVED + r, load(rays.integers, UNRESOLVED + r) | load(lanes.must_resolve, k))
-    block = first_block(load(rays.integers, CHILD + r))
     while bits != 0:
         i = lowest_bit(bits)
         bits &= bits - 1
         w = load(lanes.hits, 4 * BLOCK_FACES * k + 3 * BLOCK_FACES + i)
         if tree.ways.admits(tree, w, load(rays.doubles, DIRECTION_Z + r)):
-            store(rays.integers, FACE + r, np.int64(face_in(tree, block * BLOCK_FACES + i)))
+            store(rays.integers, FACE + r, 0)
             return True
     return False
 
