@@ -285,6 +285,8 @@ def resume_in_tree(tree, sources, rays, lanes, r, any_hit):
         prefetch_node(tree.nodes, child)
     else:
         prefetch_block(tree.blocks, first_block(child), tree.wide)
+        if any_hit is None:
+            prefetch(tree.faces, first_block(child) * BLOCK_FACES)
     return child
 
 
