@@ -9,6 +9,7 @@ from renderer.numerics.simd import (
     lowest_bit,
     minimum,
     movemask,
+    splat4,
     splat8,
 )
 from renderer.trace.best import NO_FACE, Best, hit_on, is_better, no_hit
@@ -59,6 +60,23 @@ def nearest_in_blocks(tree, first, count, t_min, shear, best):
             if nearer and tree.ways.admits(tree, wi, shear.direction_z):
                 t, face, u, v, w = ti, fi, extract(hits.u, i), extract(hits.v, i), wi
     return Best(t, face, u, v, w), unresolved != 0
+
+
+@inlined
+def any_in_blocks(tree, first, count, t_min, t_max, shear):
+    """Whether there is a certain hit in ``count`` blocks, and whether an uncertain one must be resolved."""
+    unresolved = np.int64(0)
+    for block in range(first, first + count):
+        hits = hit_triangles(tree, block * BLOCK_WORDS, shear, t_min, t_max)
+        unresolved |= hits.must_resolve
+        within = movemask((hits.t >= splat4(t_min)) & (hits.t <= splat4(t_max)))
+        bits = hits.bits & ~hits.uncertain & within
+        while bits != 0:
+            i = lowest_bit(bits)
+            bits &= bits - 1
+            if tree.ways.admits(tree, extract(hits.w, i), shear.direction_z):
+                return True, unresolved != 0
+    return False, unresolved != 0
 
 
 @kernel

@@ -45,6 +45,7 @@ from renderer.trace.ray_lanes import (
     SLOPE_U,
     SLOPE_V,
     WIDTH,
+    any_in_leaf,
     nearest_in_leaf,
 )
 from renderer.trace.stack_entry import distance_of, octant_of
@@ -313,7 +314,7 @@ def test_leaf(tree, rays, meeting, leaf, any_hit):
     while meeting != 0:
         r = lowest_bit(meeting)
         meeting &= meeting - 1
-        hit, must_resolve = nearest_in_leaf(tree, rays, r, leaf)
+        hit, must_resolve = of_none(any_hit, nearest_in_leaf, any_in_leaf)(tree, rays, r, leaf)
         unresolved |= np.int64(must_resolve) << r
         if any_hit is not None and hit:
             # A limit that no box lies within: the ray meets no further one.

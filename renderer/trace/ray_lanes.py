@@ -9,7 +9,7 @@ from renderer.numerics.kinds import of_none
 from renderer.numerics.simd import broadcast_like, load, narrow, select, store
 from renderer.trace.best import NO_FACE, Best
 from renderer.trace.intersect import Shear, Slabs, box_limit, largest_of, make_shear, make_slabs, round_down
-from renderer.trace.leaf import nearest_in_blocks
+from renderer.trace.leaf import any_in_blocks, nearest_in_blocks
 from renderer.trace.rays import eight_rays_at
 from renderer.trace.starts.record import EDGE, no_start
 from renderer.trace.walk import blocks_of
@@ -199,3 +199,14 @@ def nearest_in_leaf(tree, rays, r, leaf):
     put_best(rays, r, best)
     store(rays.floats, LIMIT + r, box_limit(best.t, load(rays.doubles, LARGEST + r)))
     return best.face != NO_FACE, unresolved
+
+
+@inlined
+def any_in_leaf(tree, rays, r, leaf):
+    """``nearest_in_leaf`` for any hit, of which only that there is one is kept."""
+    first, count = blocks_of(leaf)
+    t_min, t_max = load(rays.doubles, T_MIN + r), load(rays.doubles, T + r)
+    hit, unresolved = any_in_blocks(tree, first, count, t_min, t_max, shear_of(rays, r))
+    if hit:
+        store(rays.integers, FACE + r, 0)
+    return hit, unresolved
