@@ -12,7 +12,7 @@ from renderer.numerics.simd import load, minimum, offset, store
 from renderer.trace.intersect import see_triangles
 from renderer.trace.layout import BLOCK_WORDS
 from renderer.trace.ray_lanes import CHILD, NUMBER, WIDTH, Prepared, shear_of
-from renderer.trace.stream import MIN_ACTIVE, LaneCounts, Lanes, Queue, clear_lanes, meet_nodes, run_lanes
+from renderer.trace.stream import MIN_ACTIVE, LaneCounts, Lanes, Queue, clear_lanes, run_lanes
 from renderer.trace.walk import first_block
 
 # Rays that are searched for together, and the most blocks listed for each: twice as many as most rays through closed
@@ -64,14 +64,9 @@ def find_blocks(tree, rays, begin, end, scratch, found):
     none, queue = LaneCounts(np.int64(0), np.int64(0), np.int64(0)), Queue(found.numbers, np.int64(0), count)
     following, rounds = run_lanes(
         tree, rays, scratch.prepared, scratch.lanes, none, queue, _ROUNDS, query, True,
-        _enter, _see_leaves, _list_seen, _finish,
+        _see_leaves, _list_seen, _finish,
     )  # fmt: skip
     return begin + following, rounds * (MIN_ACTIVE // WIDTH)
-
-
-@inlined
-def _enter(tree, query, lanes, count):
-    meet_nodes(tree, query.prepared, lanes, count, True)
 
 
 @inlined

@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
-from renderer.numerics.kinds import of_none
 from renderer.numerics.simd import (
     double_of,
     fabs,
@@ -65,7 +64,7 @@ from renderer.trace.ray_lanes import (
 from renderer.trace.rays import ray_at
 from renderer.trace.stack_entry import octant_of
 from renderer.trace.starts.record import start_row
-from renderer.trace.stream import END, NO_DISTANCE, prefetch_block, prefetch_node, topmost, topmost_within
+from renderer.trace.stream import END, NO_DISTANCE, prefetch_block, prefetch_node, topmost_within
 from renderer.trace.ways import Ways
 
 # An object, int64: a tree as in ``layout``; the addresses of its mesh's vertices and faces; and, as float64 in the
@@ -484,7 +483,7 @@ def _resume(tree, rays, prepared, lanes, r, any_hit):
     integers, limit = prepared.integers, load(prepared.floats, LIMIT + r)
     top, number = load(integers, TOP + r), load(integers, _INSTANCE + r)
     while True:
-        top = of_none(any_hit, topmost_within, topmost)(lanes, top, limit)
+        top = topmost_within(lanes, top, limit, any_hit)
         child = np.int64(load(lanes.children, top))
         if child == END:
             break

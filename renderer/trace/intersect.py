@@ -560,6 +560,12 @@ def unsure_sides(edges, slack):
     return movemask(may) & ~movemask((edges.least > error) | (edges.most < zero - error))
 
 
+@inlined
+def bits_within(t, t_min, t_max):
+    """The bits of those of four t that are from t_min to t_max."""
+    return movemask((t >= splat4(t_min)) & (t <= splat4(t_max)))
+
+
 class BlockHits(NamedTuple):
     """The hits of one ray in a block: the bits of the triangles hit, those of ``PlaneHits``, t, and the numerators and
     denominator of the barycentrics.

@@ -12,6 +12,8 @@ from renderer.lazy import lazy
 T = TypeVar("T", bound=np.generic)
 
 CACHE_LINE = 64
+# The bytes of an int64 or a float64.
+WORD_BYTES = 8
 
 # A node is NODE_WORDS 32-bit words, four cache lines. Words 0-47 are six rows of eight float32, one value per octant:
 # lower x, upper x, lower y, upper y, lower z, upper z. Words CHILDREN to CHILDREN + 7 are its children, words ORDERS to

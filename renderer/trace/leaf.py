@@ -9,11 +9,10 @@ from renderer.numerics.simd import (
     lowest_bit,
     minimum,
     movemask,
-    splat4,
     splat8,
 )
 from renderer.trace.best import NO_FACE, Best, hit_on, is_better, no_hit
-from renderer.trace.intersect import face_in, hit_in, hit_triangles, make_shear, room_of, round_both
+from renderer.trace.intersect import bits_within, face_in, hit_in, hit_triangles, make_shear, room_of, round_both
 from renderer.trace.layout import (
     BLOCK_FACES,
     BLOCK_WORDS,
@@ -69,14 +68,20 @@ def any_in_blocks(tree, first, count, t_min, t_max, shear):
     for block in range(first, first + count):
         hits = hit_triangles(tree, block * BLOCK_WORDS, shear, t_min, t_max)
         unresolved |= hits.must_resolve
-        within = movemask((hits.t >= splat4(t_min)) & (hits.t <= splat4(t_max)))
-        bits = hits.bits & ~hits.uncertain & within
-        while bits != 0:
-            i = lowest_bit(bits)
-            bits &= bits - 1
-            if tree.ways.admits(tree, extract(hits.w, i), shear.direction_z):
-                return True, unresolved != 0
+        bits = hits.bits & ~hits.uncertain & bits_within(hits.t, t_min, t_max)
+        if is_any_admitted(tree, bits, hits.w, shear.direction_z):
+            return True, unresolved != 0
     return False, unresolved != 0
+
+
+@inlined
+def is_any_admitted(tree, bits, w, dz):
+    """Whether any of the hits ``bits`` of a block counts, given the w of its four faces and the ray's direction_z."""
+    while bits != 0:
+        if tree.ways.admits(tree, extract(w, lowest_bit(bits)), dz):
+            return True
+        bits &= bits - 1
+    return False
 
 
 @kernel

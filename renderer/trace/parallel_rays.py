@@ -33,10 +33,10 @@ from renderer.numerics.simd import (
     store,
     widen,
 )
-from renderer.trace.best import NO_FACE, no_hit
+from renderer.trace.best import NO_FACE
 from renderer.trace.intersect import Shear, make_shear
-from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS, cache_aligned
-from renderer.trace.leaf import nearest_in_blocks
+from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CHILDREN, NODE_WORDS, WORD_BYTES, cache_aligned
+from renderer.trace.leaf import any_in_blocks
 from renderer.trace.projection import (
     EXTENT_WORDS,
     Extent,
@@ -66,7 +66,6 @@ from renderer.trace.walk import blocks_of, stack_size
 _MOST_NODES = 4
 # The rows of a group of eight rays, float32.
 _X, _Y, _H, _ALONG, _SLACK, _GROUP = 0, 8, 16, 24, 32, 40
-_BYTES = 8
 # Coordinates of rays that err by more could overflow; those that err by less are finite, and so is each middle.
 _TOO_FAR = np.float32(2.0**80)
 _NOWHERE = np.float32(np.inf)
@@ -110,7 +109,7 @@ def parallel_pointers(scratch):
     """The ``ParallelPointers`` into a ``ParallelScratch``."""
     floats, integers, rays = float32_pointer(address(scratch.floats)), pointer(scratch.integers), scratch.rays
     in_doubt, waiting = offset(integers, rays + 8), offset(integers, 3 * (rays + 8))
-    entered = int32_pointer(address(scratch.integers) + 2 * _BYTES * (rays + 8))
+    entered = int32_pointer(address(scratch.integers) + 2 * WORD_BYTES * (rays + 8))
     return ParallelPointers(floats, offset(floats, rays // 8 * _GROUP), integers, in_doubt, entered, waiting)
 
 
@@ -201,11 +200,11 @@ def _test_leaf(tree, rays, found, parallel, seen, leaf, some):
 @inlined
 def _hides(tree, rays, found, parallel, seen, block, i):
     """Whether a block hides ray ``i``."""
-    best, unresolved = nearest_in_blocks(tree, block, 1, 0.0, _shear_from(rays, i, seen.shear), no_hit(seen.t_max))
+    hit, unresolved = any_in_blocks(tree, block, 1, 0.0, seen.t_max, _shear_from(rays, i, seen.shear))
     if unresolved:
         store(parallel.in_doubt, i, 1)
-    store(found.hit, i, best.face != NO_FACE)
-    return best.face != NO_FACE
+    store(found.hit, i, hit)
+    return hit
 
 
 @inlined

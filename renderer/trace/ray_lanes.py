@@ -187,6 +187,12 @@ def put_best(rays, r, best):
 
 
 @inlined
+def put_any(rays, r):
+    """Note that ray ``r`` has a hit: a face that is not NO_FACE. Reading the right one would take time."""
+    store(rays.integers, FACE + r, 0)
+
+
+@inlined
 def nearest_in_leaf(tree, rays, r, leaf):
     """Test a leaf, a negative child, for a better hit of ray ``r``.
 
@@ -208,5 +214,5 @@ def any_in_leaf(tree, rays, r, leaf):
     t_min, t_max = load(rays.doubles, T_MIN + r), load(rays.doubles, T + r)
     hit, unresolved = any_in_blocks(tree, first, count, t_min, t_max, shear_of(rays, r))
     if hit:
-        store(rays.integers, FACE + r, 0)
+        put_any(rays, r)
     return hit, unresolved

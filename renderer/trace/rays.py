@@ -28,10 +28,10 @@ from renderer.numerics.simd import (
 )
 from renderer.trace.best import NO_FACE, side_of
 from renderer.trace.intersect import Ray
+from renderer.trace.layout import WORD_BYTES
 from renderer.trace.starts.record import ALL, FACE, SLACK, no_start, start_pointers, start_row
 
 _MOST, _TINIEST = np.finfo(np.float64).max, 2.0**-1074
-_BYTES = 8
 # Rows of the array that closest hits are written to.
 HIT_ROWS = 6
 
@@ -108,7 +108,7 @@ def found_pointers(t, face, u, v, side, pile, hit):
 def hit_pointers(out, count):
     """``HitPointers`` into the memory of ``out``: rows t, u, v, face, side and pile of ``count``
     values, or ``count`` bools."""
-    first, row = address(out), _BYTES * count
+    first, row = address(out), WORD_BYTES * count
     return HitPointers(
         float64_pointer(first), int64_pointer(first + 3 * row), float64_pointer(first + row),
         float64_pointer(first + 2 * row), int64_pointer(first + 4 * row), int64_pointer(first + 5 * row),

@@ -16,6 +16,7 @@ from renderer.numerics.simd import (
     count_bits,
     counting8,
     load,
+    load4,
     load8,
     lowest_bit,
     minimum,
@@ -24,17 +25,16 @@ from renderer.numerics.simd import (
     permuted,
     prefetch,
     set_first,
-    splat4,
     splat8,
     store,
 )
 from renderer.trace.best import NO_FACE, Best
-from renderer.trace.intersect import box_limit, face_in, meet_boxes, meet_planes, order_for, see_triangles
+from renderer.trace.intersect import bits_within, box_limit, face_in, meet_boxes, meet_planes, order_for, see_triangles
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS, CACHE_LINE, CHILDREN, MAX_LEAF_BLOCKS, NODE_WORDS
+from renderer.trace.leaf import is_any_admitted
 from renderer.trace.ray_lanes import (
     CHILD,
     DIRECTION_Z,
-    FACE,
     LARGEST,
     LIMIT,
     LOWER,
@@ -48,6 +48,7 @@ from renderer.trace.ray_lanes import (
     lane_index,
     lane_of,
     prepare_eight,
+    put_any,
     put_best,
     shear_of,
     slabs_of,
@@ -258,18 +259,15 @@ def resume(tree, rays, prepared, lanes, r, any_hit):
 
 
 @inlined
-def topmost_within(lanes, top, limit):
-    """The place of the topmost entry below ``top`` that is not beyond a limit."""
+def topmost_within(lanes, top, limit, any_hit):
+    """The place of the topmost entry below ``top`` that is not beyond a limit; the topmost unless ``any_hit`` is None,
+    as entries have no distances then.
+    """
     top -= 1
-    while load(lanes.distances, top) > limit:
-        top -= 1
+    if any_hit is None:
+        while load(lanes.distances, top) > limit:
+            top -= 1
     return top
-
-
-@inlined
-def topmost(lanes, top, limit):
-    """``topmost_within`` where entries have no distances."""
-    return top - 1
 
 
 @inlined
@@ -277,7 +275,7 @@ def resume_in_tree(tree, sources, rays, lanes, r, any_hit):
     """``resume`` in a mesh."""
     # rule: resume-limit
     limit, top = load(rays.floats, LIMIT + r), load(rays.integers, TOP + r)
-    top = of_none(any_hit, topmost_within, topmost)(lanes, top, limit)
+    top = topmost_within(lanes, top, limit, any_hit)
     child = np.int64(load(lanes.children, top))
     store(rays.integers, CHILD + r, child)
     store(rays.integers, TOP + r, top)
@@ -301,8 +299,7 @@ def meet_leaves(tree, rays, lanes, count, any_hit):
         edges, seen = see_triangles(tree, base, shear)
         t_min, t_max = load(rays.doubles, T_MIN + r), load(rays.doubles, T + r)
         planes = meet_planes(tree, base, edges, seen, shear, t_min, t_max)
-        within = movemask((planes.t >= splat4(t_min)) & (planes.t <= splat4(t_max)))
-        store(lanes.bits, k, seen & ~planes.uncertain & within)
+        store(lanes.bits, k, seen & ~planes.uncertain & bits_within(planes.t, t_min, t_max))
         store(lanes.must_resolve, k, planes.must_resolve)
         hits = offset(lanes.hits, 4 * BLOCK_FACES * k)
         if any_hit is None:
@@ -339,17 +336,14 @@ def take_hits(tree, rays, lanes, k):
 
 @inlined
 def take_any(tree, rays, lanes, k):
-    """``take_hits`` for any hit, of which only that there is one is kept: reading its face would cost a twelfth."""
+    """``take_hits`` for any hit, of which only that there is one is kept."""
     r, bits = load(lanes.at_leaf, k), load(lanes.bits, k)
     store(rays.integers, UNRESOLVED + r, load(rays.integers, UNRESOLVED + r) | load(lanes.must_resolve, k))
-    while bits != 0:
-        i = lowest_bit(bits)
-        bits &= bits - 1
-        w = load(lanes.hits, 4 * BLOCK_FACES * k + 3 * BLOCK_FACES + i)
-        if tree.ways.admits(tree, w, load(rays.doubles, DIRECTION_Z + r)):
-            store(rays.integers, FACE + r, 0)
-            return True
-    return False
+    w = load4(lanes.hits, 4 * BLOCK_FACES * k + 3 * BLOCK_FACES)
+    hit = is_any_admitted(tree, bits, w, load(rays.doubles, DIRECTION_Z + r))
+    if hit:
+        put_any(rays, r)
+    return hit
 
 
 @inlined
@@ -381,13 +375,12 @@ def list_lane(lanes, r, child, counts):
 
 
 @inlined
-def run_lanes(tree, rays, prepared, lanes, counts, queue, most_rounds, query, any_hit, enter, meet, take, finish):
+def run_lanes(tree, rays, prepared, lanes, counts, queue, most_rounds, query, any_hit, meet, take, finish):
     """Trace the rays in lanes and those of a queue to their ends; none of the queue begins after ``most_rounds``
     rounds.
 
-    query   what the four kernels read
+    query   what the three kernels read
     any_hit as of ``meet_nodes``
-    enter   enter(tree, query, lanes, count): ``meet_nodes`` of each ray at a node
     meet    meet(tree, query, lanes, count): compute the hits of each ray at a leaf in the first block of its leaf
     take    take(tree, query, k): take the hits of the k-th of them; returns whether the ray ends
     finish  finish(tree, query, r): finish the ray in lane r; returns the rounds that it took
@@ -404,7 +397,7 @@ def run_lanes(tree, rays, prepared, lanes, counts, queue, most_rounds, query, an
         rounds += 1
         # Take the rays at nodes one step on.
         entered, counts = counts.nodes, LaneCounts(np.int64(0), counts.leaves, counts.ends)
-        enter(tree, query, lanes, entered)
+        meet_nodes(tree, prepared, lanes, entered, any_hit)
         for k in range(entered):
             r = load(lanes.at_node, k)
             counts = list_lane(lanes, r, resume(tree, rays, prepared, lanes, r, any_hit), counts)

@@ -21,7 +21,7 @@ from renderer.numerics.simd import (
 )
 from renderer.trace.best import NO_FACE, no_hit
 from renderer.trace.intersect import largest_of, make_shear
-from renderer.trace.layout import cache_aligned
+from renderer.trace.layout import WORD_BYTES, cache_aligned
 from renderer.trace.leaf import search_all_blocks
 from renderer.trace.packet import are_coherent, child_of, meet_octant
 from renderer.trace.ray_lanes import (
@@ -55,7 +55,6 @@ from renderer.trace.stream import (
     list_lane,
     make_lanes,
     meet_leaves,
-    meet_nodes,
     resume,
     run_lanes,
     take_any,
@@ -90,7 +89,6 @@ _STACK_SIZE, _FLOATS, _PREPARED = 0, 8, GROUPS * GROUP_STRIDE
 _DOUBLES = _FLOATS + _PREPARED // 2 + GROUP_STRIDE // 2
 _HOLDERS = _DOUBLES + _PREPARED + LANE_DOUBLES
 _INTEGERS = _HOLDERS + HOLDERS_WORDS + GROUP_STRIDE
-_BYTES = 8
 
 
 def new_scratch(depth: int, rays: int) -> NDArray[np.int64]:
@@ -116,11 +114,11 @@ def holders_in(scratch: NDArray[np.int64]) -> NDArray[np.int64]:
 def scratch_pointers(scratch, starts):
     """The ``ScratchPointers`` into a scratch, for rays with ``starts``, or ON_SURFACE."""
     words, start = pointer(scratch), address(scratch)
-    floats, doubles = float32_pointer(start + _BYTES * _FLOATS), float64_pointer(start + _BYTES * _DOUBLES)
+    floats, doubles = float32_pointer(start + WORD_BYTES * _FLOATS), float64_pointer(start + WORD_BYTES * _DOUBLES)
     size, integers = load(words, _STACK_SIZE), offset(words, _INTEGERS)
     lane_integers = offset(integers, _PREPARED)
-    stacks = start + _BYTES * (_INTEGERS + _PREPARED + LANE_INTEGERS)
-    distances, children = float32_pointer(stacks), int32_pointer(stacks + _BYTES // 2 * GROUPS * WIDTH * size)
+    stacks = start + WORD_BYTES * (_INTEGERS + _PREPARED + LANE_INTEGERS)
+    distances, children = float32_pointer(stacks), int32_pointer(stacks + WORD_BYTES // 2 * GROUPS * WIDTH * size)
     lanes = make_lanes(lane_integers, offset(doubles, _PREPARED), distances, children, size)
     packet_stack = offset(lane_integers, LANE_INTEGERS + GROUPS * WIDTH * size)
     return ScratchPointers(
@@ -169,11 +167,6 @@ def _finish(tree, query, r):
 
 
 @inlined
-def _enter(tree, query, lanes, count):
-    meet_nodes(tree, query.scratch.prepared, lanes, count, query.any_hit)
-
-
-@inlined
 def _meet(tree, query, lanes, count):
     meet_leaves(tree, query.scratch.prepared, lanes, count, query.any_hit)
 
@@ -194,7 +187,7 @@ def _run(tree, query, counts, queue):
     scratch = query.scratch
     return run_lanes(
         tree, query.rays, scratch.prepared, scratch.lanes, counts, queue, _WORK, query, query.any_hit,
-        _enter, _meet, _take, _finish,
+        _meet, _take, _finish,
     )  # fmt: skip
 
 

@@ -5,6 +5,7 @@ import pytest
 from cases import cases
 from numba import njit
 
+from renderer.jit.decorators import kernel
 from renderer.numerics.simd import (
     add_each,
     bits_float,
@@ -28,7 +29,6 @@ from renderer.numerics.simd import (
     minimum,
     movemask,
     narrow,
-    octal8,
     permuted,
     pointer,
     select,
@@ -39,6 +39,7 @@ from renderer.numerics.simd import (
     store,
     widen,
 )
+from renderer.trace.walk import entered_in_order
 
 F32 = [0.0, -0.0, 1.0, -1.5, np.inf, -np.inf, np.nan, 1e-45, 3.4e38, 0.1, 0.3, 7.0]
 
@@ -178,12 +179,10 @@ def test_pointers_from_addresses():
     assert [a[1] for a in arrays] == [np.float32(3), 1 / 3 + 1, -8]
 
 
-@njit
+@kernel
 def put_in_order(distances, links, limit, order, out, numbers):
     octants = load8(distances, 0)
-    lanes = octal8(order)
-    bits = movemask(permuted(octants <= splat8(limit), lanes))
-    lanes = permuted(lanes, set_first(bits))
+    lanes, bits = entered_in_order(octants <= splat8(limit), order)
     store(out, 1, joined(permuted(load8(links, 2), lanes), permuted(octants, lanes)))
     store(numbers, 1, add_each(lanes, 40))
     return bits
