@@ -39,6 +39,7 @@ from numba.extending import register_model
 
 from renderer.jit.apart import ApartStore, write_symbol
 from renderer.jit.cache import KernelStore
+from renderer.jit.contexts import PieceTarget, piece_typing
 from renderer.jit.libraries import EntryLibrary, PieceLibrary
 from renderer.jit.notice import compiling
 from renderer.jit.pieces import PieceStore
@@ -207,6 +208,12 @@ _PIECE_PASSES = (
 
 
 class _PieceCompiler(CompilerBase):  # type: ignore[misc]
+    def __init__(
+        self, typing: Any, target: Any, library: Any, arguments: Any, result: Any, flags: Any, kinds: Any
+    ) -> None:
+        typing = piece_typing(typing, flags.forceinline)
+        super().__init__(typing, PieceTarget(target, typing), library, arguments, result, flags, kinds)
+
     def _compile_bytecode(self) -> Any:
         state = self.state
         unique = _kernels[state.func_id.func].piece_store.unique(state.args, state.targetctx)

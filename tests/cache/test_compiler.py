@@ -1,6 +1,7 @@
 """How kernels are compiled: pieces and entries, what other kernels may do with them, and other versions of Numba."""
 
 import gc
+import operator
 import os
 import subprocess
 import sys
@@ -8,6 +9,8 @@ from pathlib import Path
 
 import numba
 import pytest
+from numba.core import targetconfig
+from numba.extending import intrinsic, overload
 
 from renderer import Octree
 from renderer.jit import compiler
@@ -66,6 +69,48 @@ def test_constants_compile_a_kernel_once():
 
     assert sum_of_powers(2.0) == 14.0
     assert len(power.piece.overloads) == 1
+
+
+def test_a_kernel_finds_what_was_declared_after_another_was_compiled():
+    """Pieces remember how calls are typed, which must not hide that an operator means more by now."""
+
+    @kernel
+    def before(x):
+        return abs(x) << 2
+
+    @kernel
+    def after(x):
+        return abs(x) << 2
+
+    @intrinsic
+    def times(context, x, y):
+        return x(x, x), lambda context, builder, signature, arguments: builder.fmul(*arguments)
+
+    with pytest.raises(numba.TypingError):
+        before(3.0)
+
+    @overload(operator.lshift)
+    def _shifted(x, y):
+        return (lambda x, y: times(x, 2.0**y)) if x == numba.float64 else None
+
+    assert after(-3.0) == 12.0
+
+
+def test_an_overload_is_inlined_by_force_only_in_what_is_so():
+    """Numba compiles it once for each, though the types of its call are remembered."""
+    called = []
+
+    def double(x):
+        raise NotImplementedError
+
+    @overload(double)
+    def _double(x):
+        called.append(targetconfig.ConfigStack.top_or_none().forceinline)
+        return lambda x: 2 * x
+
+    made = [kernel(lambda x: double(x)), inlined(lambda x: double(x) + 1), kernel(lambda x: double(x) + 2)]
+    assert [one(3) for one in made] == [6, 7, 8]
+    assert called == [False, True]
 
 
 def test_what_python_does_not_call_is_not_compiled_for_it():
