@@ -477,40 +477,46 @@ def _node_of(tree, prepared, r):
     return float32_pointer(nodes), int32_pointer(nodes), node * NODE_WORDS
 
 
-@kernel
+@inlined
 def _resume(tree, rays, prepared, lanes, r, any_hit):
     # rule: resume-in-scene
     integers, limit = prepared.integers, load(prepared.floats, LIMIT + r)
-    top, number = load(integers, TOP + r), load(integers, _INSTANCE + r)
-    while True:
-        top = topmost_within(lanes, top, limit, any_hit)
-        child = np.int64(load(lanes.children, top))
-        if child == END:
-            break
-        if child == _LEAVE:
-            ray, _ = ray_at(rays, load(integers, NUMBER + r))
-            put_slabs(prepared, r, make_slabs(ray, largest_of(ray)))
-            number = np.int64(0)
-            store(integers, _NODES_AT + r, tree.top)
-            continue
-        if number == 0 and child < 0:
-            if not _may_enter(tree, prepared, r, ~child + 1):
-                continue
-            number = ~child + 1
-            store(lanes.distances, top, NO_DISTANCE)
-            store(lanes.children, top, np.int32(_LEAVE))
-            top += 1
-            _enter_instance(tree, rays, prepared, r, number)
-            child = np.int64(0)
-        if number > 0:
-            child = _in_scene(number, child)
-        break
-    store(integers, _INSTANCE + r, number)
+    number, top = load(integers, _INSTANCE + r), topmost_within(lanes, load(integers, TOP + r), limit, any_hit)
+    child = np.int64(load(lanes.children, top))
+    if child == _LEAVE or (number == 0 and _LEAVE < child < 0):
+        number, top, child = _change_frame(tree, rays, prepared, lanes, r, any_hit, top, limit)
+    if number > 0:
+        child = _in_scene(number, child)
     store(integers, CHILD + r, child)
     store(integers, TOP + r, top)
     if child != END:
         _prefetch(tree, prepared, r, child)
     return child
+
+
+@kernel
+def _change_frame(tree, rays, prepared, lanes, r, any_hit, top, limit):
+    """Leave and enter instances, from the entry at ``top`` of a ray's stack on, to the next node or to END.
+
+    Returns the instance, the new top, and the child there.
+    """
+    while True:
+        child = np.int64(load(lanes.children, top))
+        if child == END:
+            break
+        if _LEAVE < child < 0 and _may_enter(tree, prepared, r, ~child + 1):
+            number = ~child + 1
+            store(lanes.distances, top, NO_DISTANCE)
+            store(lanes.children, top, np.int32(_LEAVE))
+            _enter_instance(tree, rays, prepared, r, number)
+            return number, top + 1, np.int64(0)
+        if child >= 0:
+            if load(prepared.integers, _INSTANCE + r) != 0:
+                _return_to_top(tree, rays, prepared, r)
+            break
+        top = topmost_within(lanes, top, limit, any_hit)
+    store(prepared.integers, _INSTANCE + r, 0)
+    return np.int64(0), top, child
 
 
 @inlined
@@ -525,10 +531,19 @@ def _enter_instance(tree, rays, prepared, r, number):
     ray, _ = ray_at(rays, load(prepared.integers, NUMBER + r))
     instance, words = _instance(tree, number)
     object_ = _object(words)
+    store(prepared.integers, _INSTANCE + r, number)
     put_slabs(prepared, r, slabs_within(instance, words, ray, largest_of(ray)))
     store(prepared.integers, _NODES_AT + r, _nodes(object_))
     # The address is even: its lowest bit has room for WIDE.
     store(prepared.integers, _BLOCKS_AT + r, load(object_, BLOCKS) | load(object_, WIDE))
+
+
+@inlined
+def _return_to_top(tree, rays, prepared, r):
+    """Turn the ray in lane ``r`` back into the frame of the scene."""
+    ray, _ = ray_at(rays, load(prepared.integers, NUMBER + r))
+    put_slabs(prepared, r, make_slabs(ray, largest_of(ray)))
+    store(prepared.integers, _NODES_AT + r, tree.top)
 
 
 @inlined

@@ -25,14 +25,8 @@ def _along(matrix, row, x, y, z):
     return x * load(m, 0) + (y * load(m, 1) + (z * load(m, 2) + load(m, 3)))
 """
 _LEFT_IN_FRAME = """
-def _resume(tree, rays, prepared, lanes, r, any_hit):
-    left = load(prepared.integers, _INSTANCE + r)
-    child = sound(tree, rays, prepared, lanes, r, any_hit)
-    if left != 0 and load(prepared.integers, _INSTANCE + r) == 0:
-        ray, _ = ray_at(rays, load(prepared.integers, NUMBER + r))
-        instance, words = _instance(tree, left)
-        put_slabs(prepared, r, slabs_within(instance, words, ray, largest_of(ray)))
-    return child
+def _return_to_top(tree, rays, prepared, r):
+    store(prepared.integers, _NODES_AT + r, tree.top)
 """
 _FARTHEST_TWO = """
 def _trace_packet(tree, rays, stack, any_hit):
@@ -53,7 +47,7 @@ _CHANGES: dict[str, Change] = {
     "ignored instances are hit": Rule("mask-of-ray", without("and", 1)),
     "instances get no room for rounding": Rule("room-of-instance", value("0.0")),
     "streams in scenes exit at half their best hit": Rule("resume-in-scene", element(1, "_ * np.float32(0.5)")),
-    "a ray that left an instance goes on in its frame": Function("instances._resume", _LEFT_IN_FRAME),
+    "a ray that left an instance goes on in its frame": Function("instances._return_to_top", _LEFT_IN_FRAME),
     "packets forget all but the farthest two instances": Function("instances._trace_packet", _FARTHEST_TWO),
     "boxes of placed meshes get no room": Constant("instances._BOX_ROOM", "np.float32(0.0)"),
     "nearly singular matrices are taken": Constant("placing.SINGULAR", "1e300"),
