@@ -1,7 +1,7 @@
 """Numba's contexts as pieces are compiled with: they do not look for new declarations, and remember how calls of
 operators and intrinsics are typed.
 
-Numba looks and types anew in each function, which is a fifth of the time of compiling. The entry whose pieces are
+Numba looks and types anew in each function, which is an eighth of the time of compiling. The entry whose pieces are
 compiled has just looked.
 """
 

@@ -148,7 +148,12 @@ def test_compiling_leaves_the_garbage_collector_as_it_was():
         assert once(1) == 42 and not gc.isenabled()
     finally:
         gc.enable()
-    assert once(1.0) == 42.0 and gc.isenabled()
+    assert once(1.0) == 42.0 and gc.isenabled() and gc.get_freeze_count() == 0
+    gc.freeze()
+    try:
+        assert once(1 + 0j) == 42 and gc.get_freeze_count() > 0
+    finally:
+        gc.unfreeze()
 
 
 def test_the_probe_finds_a_numba_that_fits_and_one_that_does_not(monkeypatch):
