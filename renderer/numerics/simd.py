@@ -296,8 +296,8 @@ def _load(builder: Any, pointer: Any, array_type: Any) -> Any:
 
 @intrinsic
 def load8(typingctx, array, index):
-    """Eight float32, int32 or int64 from a one-dimensional array or ``pointer`` of such numbers, from ``index`` on."""
-    vector = {types.float32: F32X8, types.int32: I32X8, types.int64: I64X8}[array.dtype]
+    """Eight numbers of 32 or 64 bits from a one-dimensional array or ``pointer`` of such, from ``index`` on."""
+    vector = {types.float32: F32X8, types.float64: F64X8, types.int32: I32X8, types.int64: I64X8}[array.dtype]
 
     def codegen(context, builder, sig, args):
         return _load(builder, _pointer(context, builder, sig.args[0], *args, _llvm(vector)), sig.args[0])

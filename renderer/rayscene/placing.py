@@ -98,7 +98,7 @@ def _place_one(matrix, record, words):
 @inlined
 def _put_row(record, k, row, factor):
     for j in range(3):
-        store(record, INVERSE + 3 * k + j, row[j] * factor)
+        store(record, INVERSE + 3 * j + k, row[j] * factor)
 
 
 @kernel
@@ -125,15 +125,15 @@ def _put_room(record, own):
     for k in range(3):
         room = 0.0
         for j in range(3):
-            if not maximum(abs(load(matrix, 4 * k + j)), abs(load(inverse, 3 * k + j))) <= STEEPEST:
+            if not maximum(abs(load(matrix, 4 * k + j)), abs(load(inverse, 3 * j + k))) <= STEEPEST:
                 return False
             off, size = -1.0 if j == k else 0.0, 0.0
             for n in range(3):
-                off += load(inverse, 3 * k + n) * load(matrix, 4 * n + j)
-                size += abs(load(inverse, 3 * k + n) * load(matrix, 4 * n + j))
+                off += load(inverse, 3 * n + k) * load(matrix, 4 * n + j)
+                size += abs(load(inverse, 3 * n + k) * load(matrix, 4 * n + j))
             worst = maximum(worst, abs(off))
             room += (abs(off) + size * _ROUNDED) * load(own, HALF + j)
-            room += abs(load(inverse, 3 * k + j)) * (far * DISTANCE_ROOM + _size(matrix, own, j) * _ROUNDED)
+            room += abs(load(inverse, 3 * j + k)) * (far * DISTANCE_ROOM + _size(matrix, own, j) * _ROUNDED)
         store(record, ROOM + k, room)
     return worst <= SINGULAR
 

@@ -17,18 +17,22 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.simd import (
+    broadcast_like,
     double_of,
+    extract,
     fabs,
     float32_pointer,
     float64_pointer,
     int32_pointer,
     int64_pointer,
+    is_negative,
     load,
     load4,
     load8,
     local_floats,
     local_words,
     maximum,
+    movemask,
     narrow,
     offset,
     pointer,
@@ -68,12 +72,12 @@ from renderer.trace.stream import END, NO_DISTANCE, prefetch_block, prefetch_nod
 from renderer.trace.ways import Ways
 
 # An object, int64: a tree as in ``layout``; the addresses of its mesh's vertices and faces; and, as float64 in the
-# tree's units, the middle and the half of its mesh's box.
-VERTICES, MESH_FACES, MIDDLE, HALF, OBJECT_WORDS = (TREE_WORDS + k for k in (0, 1, 2, 5, 8))
-# An instance, float64: the matrix that places a block's corners, three rows of four; the inverse of its linear part;
-# the placed middle of the mesh; how far, in the mesh's units, rounding may move what is placed; and as int64 the
-# address of its object, the number of the first of its faces, and its flags.
-MATRIX, INVERSE, PLACE, ROOM, OBJECT, FIRST_FACE, FLAGS, INSTANCE_WORDS = 0, 12, 21, 24, 27, 28, 29, 30
+# tree's units, the middle and the half of its mesh's box. Eight words may be read from the middle on.
+VERTICES, MESH_FACES, MIDDLE, HALF, OBJECT_WORDS = (TREE_WORDS + k for k in (0, 1, 2, 5, 10))
+# An instance, float64: the matrix that places a block's corners, three rows of four; the inverse of its linear part, by
+# columns; how far, in the mesh's units, rounding may move what is placed; the placed middle of the mesh; and as int64
+# the address of its object, the number of the first of its faces, and its flags.
+MATRIX, INVERSE, ROOM, PLACE, OBJECT, FIRST_FACE, FLAGS, INSTANCE_WORDS = 0, 12, 21, 24, 27, 28, 29, 30
 # The bits of flags: the mask below, whether the matrix mirrors, and whether no ray sees the instance.
 MIRRORS, HIDDEN = 1 << 32, 1 << 33
 # A scene, as kernels get it, uint64: addresses of the top's nodes and of the instances; their number; and the sides of
@@ -441,25 +445,31 @@ def slabs_within(instance, words, ray, largest):
         ray.ox - load(instance, PLACE), ray.oy - load(instance, PLACE + 1), ray.oz - load(instance, PLACE + 2)
     )  # fmt: skip
     middle, slack = _middle(words), ray.slack if ray.slack < np.inf else 0.0
-    far = maximum(maximum(abs(px), abs(py)), abs(pz)) * DISTANCE_ROOM + slack
-    x = _slab_within(instance, middle, 0, (px, py, pz), ray, largest, far)
-    y = _slab_within(instance, middle, 1, (px, py, pz), ray, largest, far)
-    z = _slab_within(instance, middle, 2, (px, py, pz), ray, largest, far)
+    reach = maximum(maximum(abs(px), abs(py)), abs(pz)) * DISTANCE_ROOM + slack
+    # A lane for each axis, and five more.
+    a, b, c = load8(instance, INVERSE), load8(instance, INVERSE + 3), load8(instance, INVERSE + 6)
+    o = load8(middle, 0) + ((a * broadcast_like(px, a) + b * broadcast_like(py, a)) + c * broadcast_like(pz, a))
+    dx, dy, dz = broadcast_like(ray.dx, a), broadcast_like(ray.dy, a), broadcast_like(ray.dz, a)
+    d = (a * dx + b * dy) + c * dz
+    # rule: room-of-instance
+    room = load8(instance, ROOM) + ((fabs(a) + fabs(b)) + fabs(c)) * broadcast_like(reach, a)
+    _, _, near, far, near_inverse, far_inverse = make_slab(0, o, d, broadcast_like(largest, a), room_of(room))
+    near_rows, far_rows = _rows_of(movemask(is_negative(d)))
     return Slabs(
-        x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2], x[3], y[3], z[3], x[4], y[4], z[4], x[5], y[5], z[5]
+        *near_rows, *far_rows, *_three(near), *_three(far), *_three(near_inverse), *_three(far_inverse)
     )  # fmt: skip
 
 
 @inlined
-def _slab_within(instance, middle, axis, p, ray, largest, far):
-    """``make_slab`` along an axis of the mesh."""
-    row = offset(instance, INVERSE + 3 * axis)
-    a, b, c = load(row, 0), load(row, 1), load(row, 2)
-    o = load(middle, axis) + ((a * p[0] + b * p[1]) + c * p[2])
-    d = (a * ray.dx + b * ray.dy) + c * ray.dz
-    # rule: room-of-instance
-    room = load(instance, ROOM + axis) + ((abs(a) + abs(b)) + abs(c)) * far
-    return make_slab(axis, o, d, largest, room_of(room))
+def _three(vector):
+    return extract(vector, 0), extract(vector, 1), extract(vector, 2)
+
+
+@inlined
+def _rows_of(signs):
+    """The near and the far rows of the three axes, from the bits of those along which a direction is negative."""
+    x, y, z = 8 * (signs & 1), 16 + 4 * (signs & 2), 32 + 2 * (signs & 4)
+    return (x, y, z), (x ^ 8, y ^ 8, z ^ 8)
 
 
 @inlined

@@ -45,7 +45,7 @@ _CHANGES: dict[str, Change] = {
     "masks of rays are not asked": Rule("mask-of-ray", without("and", 0)),
     "faces that a mask leaves out hold starts": Rule("holders-of-mask", value("False")),
     "ignored instances are hit": Rule("mask-of-ray", without("and", 1)),
-    "instances get no room for rounding": Rule("room-of-instance", value("0.0")),
+    "instances get no room for rounding": Rule("room-of-instance", value("0.0 * a")),
     "streams in scenes exit at half their best hit": Rule("resume-in-scene", element(1, "_ * np.float32(0.5)")),
     "a ray that left an instance goes on in its frame": Function("instances._return_to_top", _LEFT_IN_FRAME),
     "packets forget all but the farthest two instances": Function("instances._trace_packet", _FARTHEST_TWO),
