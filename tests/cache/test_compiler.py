@@ -113,6 +113,23 @@ def test_an_overload_is_inlined_by_force_only_in_what_is_so():
     assert called == [False, True]
 
 
+def test_a_call_with_keywords_is_typed_by_them():
+    """The types of calls are remembered by their plain arguments, which are the same here."""
+
+    def scaled(x, n):
+        raise NotImplementedError
+
+    @overload(scaled)
+    def _scaled(x, n=1):
+        return lambda x, n=1: x * n
+
+    @kernel
+    def both(x):
+        return scaled(x, n=1) + scaled(x, n=2.5)
+
+    assert both(2) == 7.0
+
+
 def test_what_python_does_not_call_is_not_compiled_for_it():
     @kernel
     def below(x):
