@@ -108,7 +108,7 @@ def _seen_of(
     shape: tuple[int, ...],
 ) -> StartsOn:
     """``left`` without the faces of instances that the rays do not see, and start on as on nothing."""
-    if ignored is None and (masks == ALL).all():
+    if scene.count == 0 or (ignored is None and (masks == ALL).all()):
         return left
     number = scene.instances_of(left.faces) + 1
     flags = scene.top.instances.view(np.int64)[number - 1, FLAGS]

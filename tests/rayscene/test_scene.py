@@ -316,6 +316,8 @@ def test_hidden_instances_are_hit_by_nothing_and_keep_their_numbers():
 def test_an_empty_scene_is_hit_by_nothing():
     scene = RayScene()
     assert not scene.any_hit([0, 0, 0], [1, 0, 0]) and scene.closest_hit([0, 0, 0], [1, 0, 0]).object == -1
+    missed = scene.closest_hit([0, 0, 0], [1, 0, 0])
+    assert not scene.any_hit([0, 0, 0], [1, 0, 0], leaving=missed, mask=1, ignore=missed)
     scene.add(Mesh(np.empty((0, 3)), np.empty((0, 3), int)))
     scene.add(box())
     hits = scene.closest_hit([0.5, 0.25, 9], [0, 0, -1])
