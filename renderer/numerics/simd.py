@@ -296,7 +296,7 @@ def _load(builder: Any, pointer: Any, array_type: Any) -> Any:
 
 @intrinsic
 def load8(typingctx, array, index):
-    """Eight numbers of 32 or 64 bits from a one-dimensional array or ``pointer`` of such, from ``index`` on."""
+    """Eight float32, float64, int32 or int64 of a one-dimensional array or ``pointer`` of such, from ``index`` on."""
     vector = {types.float32: F32X8, types.float64: F64X8, types.int32: I32X8, types.int64: I64X8}[array.dtype]
 
     def codegen(context, builder, sig, args):

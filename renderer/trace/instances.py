@@ -446,7 +446,7 @@ def slabs_within(instance, words, ray, largest):
     )  # fmt: skip
     middle, slack = _middle(words), ray.slack if ray.slack < np.inf else 0.0
     reach = maximum(maximum(abs(px), abs(py)), abs(pz)) * DISTANCE_ROOM + slack
-    # A lane for each axis, and five more.
+    # A lane for each axis, and five that nobody reads.
     a, b, c = load8(instance, INVERSE), load8(instance, INVERSE + 3), load8(instance, INVERSE + 6)
     o = load8(middle, 0) + ((a * broadcast_like(px, a) + b * broadcast_like(py, a)) + c * broadcast_like(pz, a))
     dx, dy, dz = broadcast_like(ray.dx, a), broadcast_like(ray.dy, a), broadcast_like(ray.dz, a)
@@ -462,12 +462,13 @@ def slabs_within(instance, words, ray, largest):
 
 @inlined
 def _three(vector):
+    """The lanes of the three axes."""
     return extract(vector, 0), extract(vector, 1), extract(vector, 2)
 
 
 @inlined
 def _rows_of(signs):
-    """The near and the far rows of the three axes, from the bits of those along which a direction is negative."""
+    """``make_slab``'s near and far rows of the three axes, from the bits of those where a direction is negative."""
     x, y, z = 8 * (signs & 1), 16 + 4 * (signs & 2), 32 + 2 * (signs & 4)
     return (x, y, z), (x ^ 8, y ^ 8, z ^ 8)
 
