@@ -12,6 +12,7 @@ from renderer.numerics.simd import (
     address,
     bool_pointer,
     broadcast_like,
+    counting8,
     fabs,
     float64_pointer,
     gather8,
@@ -26,7 +27,7 @@ from renderer.numerics.simd import (
     select,
     store,
 )
-from renderer.trace.best import NO_FACE, side_of
+from renderer.trace.best import side_of
 from renderer.trace.intersect import Ray
 from renderer.trace.layout import WORD_BYTES
 from renderer.trace.starts.record import ALL, FACE, SLACK, no_start, start_pointers, start_row
@@ -219,22 +220,47 @@ def _or_zero(x, least):
 
 
 @inlined
+def write_misses(found, begin, end, any_hit):
+    """Write that the rays from ``begin`` to ``end`` hit nothing, before they are traced."""
+    i, none = begin, counting8(0, 0)
+    while i + 8 <= end and not any_hit:
+        _write_miss(found, i, none)
+        i += 8
+    while i < end:
+        if any_hit:
+            store(found.hit, i, False)
+        else:
+            _write_miss(found, i, 0.0)
+        i += 1
+
+
+@inlined
+def _write_miss(found, i, like):
+    """Write a miss for ray ``i``; or eight from it on, if ``like`` is a vector."""
+    store(found.t, i, broadcast_like(np.inf, like))
+    store(found.u, i, broadcast_like(np.nan, like))
+    store(found.v, i, broadcast_like(np.nan, like))
+    store(found.face, i, broadcast_like(np.int64(-1), like))
+    # In this order, as those that keep no piles give the sides' memory for them.
+    store(found.pile, i, broadcast_like(np.int64(-1), like))
+    store(found.side, i, broadcast_like(np.int64(0), like))
+
+
+@inlined
 def write_hit(found, i, scale, best, dz, any_hit):
-    """Write the ``Best`` hit of ray ``i``, or with ``any_hit`` only whether there is one.
+    """Write the ``Best`` hit of ray ``i``, or with ``any_hit`` only that there is one.
 
     ``dz`` is the ray's ``Shear.direction_z``: with the sign of w it gives the side of the face that the ray came from.
     """
-    t, face, u, v, w = best.t, best.face, best.u, best.v, best.w
-    hit = face != NO_FACE
     if any_hit:
-        store(found.hit, i, hit)
+        store(found.hit, i, True)
         return
     # + 0.0 turns -0.0 into 0.0.
     # rule: t-in-mesh-units
-    store(found.t, i, t / scale + 0.0 if hit else np.inf)
-    store(found.face, i, np.int64(face if hit else -1))
-    store(found.u, i, u / w + 0.0 if hit else np.nan)
-    store(found.v, i, v / w + 0.0 if hit else np.nan)
-    # In this order, as those that keep no piles give the sides' memory for them.
-    store(found.pile, i, np.int64(face if hit else -1))
-    store(found.side, i, np.int64(side_of(w, dz) if hit else 0))
+    store(found.t, i, best.t / scale + 0.0)
+    store(found.face, i, np.int64(best.face))
+    store(found.u, i, best.u / best.w + 0.0)
+    store(found.v, i, best.v / best.w + 0.0)
+    # The pile first, as in ``write_misses``.
+    store(found.pile, i, np.int64(best.face))
+    store(found.side, i, np.int64(side_of(best.w, dz)))

@@ -20,7 +20,7 @@ from renderer.numerics.simd import (
 from renderer.trace.best import NO_FACE, Best, no_hit
 from renderer.trace.intersect import largest_of, make_shear
 from renderer.trace.leaf import nearest_carefully, nearest_in_blocks
-from renderer.trace.rays import HitPointers, first_bad_ray, ray_at, ray_pointers, write_hit
+from renderer.trace.rays import HitPointers, first_bad_ray, ray_at, ray_pointers, write_hit, write_misses
 from renderer.trace.single_ray import Found, SingleRay, enter_counted, prepare_single, push_entered
 from renderer.trace.starts.record import PILE
 from renderer.trace.starts.search import is_near_start, search_from, t_from
@@ -82,11 +82,14 @@ def _search(tree, starts, i, ray, t_max, stack, holders, any_hit):
 
 @inlined
 def write_best(tree, rays, found, i, best, slack, largest, dz, any_hit):
-    """Write the best hit of ray ``i``, see ``write_hit``; t counts from its exact start.
+    """Write the best hit of ray ``i``, see ``write_hit``; t counts from its exact start. A miss is written already, see
+    ``write_misses``.
 
     ``slack`` is the ray's, ``largest`` the largest component of its direction: for a near hit, the move of the origin
     is a part of t.
     """
+    if best.face == NO_FACE:
+        return
     of_none(rays.starts, _write_alone, _write)(tree, rays, found, i, best, slack, largest, dz, any_hit)
 
 
@@ -107,8 +110,6 @@ def _write(tree, rays, found, i, best, slack, largest, dz, any_hit):
 @kernel
 def count_from_start(tree, rays, i, best):
     """A hit with t counted from the exact start of ray ``i``."""
-    if best.face == NO_FACE:
-        return best
     t = t_from(tree, rays.starts, i, ray_at(rays, i)[0], np.int64(best.face), best.t)
     return Best(t, best.face, best.u, best.v, best.w)
 
@@ -149,6 +150,7 @@ def trace_few(descriptor, origins, directions, t_min, t_max, t, face, u, v, side
     if bad >= 0:
         return bad
     stack = local_words()
+    write_misses(found, 0, count, False)
     for i in range(count):
         ray, limit = ray_at(source, i)
         single, nothing = prepare_single(ray), _Certain(no_hit(limit), False)
@@ -170,6 +172,7 @@ def trace_carefully(descriptor, origins, directions, t_min, t_max, starts, t, fa
     if bad >= 0:
         return bad
     stack = local_words()
+    write_misses(found, 0, count, False)
     for i in range(count):
         best = search_carefully(tree, source, i, stack, pointer(holders), False).best
         ray, _ = ray_at(source, i)

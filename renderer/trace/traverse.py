@@ -36,7 +36,7 @@ from renderer.trace.ray_lanes import (
     prepare_eight,
     start_of,
 )
-from renderer.trace.rays import HitPointers, RayPointers, first_bad_ray, ray_at
+from renderer.trace.rays import HitPointers, RayPointers, first_bad_ray, ray_at, write_misses
 from renderer.trace.single import search_carefully, write_best
 from renderer.trace.stack_entry import distance_of, octant_of
 from renderer.trace.starts.cone import HOLDERS_WORDS
@@ -256,6 +256,7 @@ def _trace_sixteen(tree, query, first):
 @kernel
 def search_blocks(tree, rays, found, begin, end, holders, any_hit):
     """``trace`` for a tree without nodes: every ray against every block; ``holders`` as in ``ScratchPointers``."""
+    write_misses(found, begin, end, any_hit is not None)
     for i in range(begin, end):
         ray, t_max = ray_at(rays, i)
         best, unresolved = no_hit(t_max), True
@@ -287,6 +288,7 @@ def _trace_on(tree, query, progress, end):
     """``trace`` for more rays; returns the ``Progress`` after them."""
     rounds, following, count, waiting = np.int64(0), progress.following, progress.count, query.scratch.waiting
     for first in range(progress.begin, end, WIDTH):
+        write_misses(query.found, first, minimum(first + WIDTH, end), query.any_hit is not None)
         if first + WIDTH <= end and are_coherent(query.rays, first):
             rounds += _trace_sixteen(tree, query, first)
             if rounds > _WORK:
