@@ -16,9 +16,13 @@ _LOG = getLogger("renderer.jit")
 
 
 class _Clock:
-    """Kernels that this process has compiled, and seconds. Numba compiles under one lock, so these do not overlap."""
+    """Kernels that this process has compiled, those that it is compiling, one within another, and seconds.
+
+    Numba compiles under one lock, so all that it is compiling is for one kernel.
+    """
 
     kernels = 0
+    under_way = 0
     seconds = 0.0
 
 
@@ -56,6 +60,7 @@ def compiling(name: str, folder: str | None) -> Iterator[None]:
         _LOG.warning("renderer: compiling kernels, which takes some seconds (%s)", kept)
     _LOG.info("compiling %s (%s)", name, kept)
     _Clock.kernels += 1
+    _Clock.under_way += 1
     began = time.perf_counter()
     # Numba makes millions of objects that stay: looking for cycles among them takes 6 % of the time, and later 4 %.
     collects = gc.isenabled()
@@ -66,7 +71,9 @@ def compiling(name: str, folder: str | None) -> Iterator[None]:
         if collects:
             _make_old()
             gc.enable()
-        _Clock.seconds += time.perf_counter() - began
+        _Clock.under_way -= 1
+        if _Clock.under_way == 0:
+            _Clock.seconds += time.perf_counter() - began
 
 
 def _make_old() -> None:
