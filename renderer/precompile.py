@@ -30,6 +30,7 @@ from renderer.mesh.shapes import icosphere
 from renderer.octree import BruteForce, Octree
 from renderer.picture.prepare import PreparedScene, prepare_scene
 from renderer.picture.render import render
+from renderer.rayscene.scene import RayScene
 from renderer.scene.camera import PerspectiveCamera
 from renderer.scene.light import PointLight
 from renderer.scene.needs import needs_of
@@ -128,6 +129,24 @@ def _study() -> None:
     _exchange()
 
 
+def _place() -> None:
+    # Of one instance the mesh alone is traced.
+    scene, ball = RayScene(), icosphere(0)
+    scene.add(ball, np.stack([np.eye(3, 4)] * 2))
+    for count in (1, 20):
+        origins, down = np.tile([0.1, 0.1, 2.0], (count, 1)), [0.0, 0.0, -1.0]
+        hits = scene.closest_hit(origins, down)
+        scene.any_hit(origins, down)
+        for query in (scene.closest_hit, scene.any_hit):
+            query(hits.points, down, leaving=hits)
+    for ask in (scene.all_hits, scene.count_steps):
+        ask(origins, down)
+    scene.contains(origins)
+    scene.closest_point(origins)
+    # The scanner stands on a face.
+    scan(scene, ball.triangles[0].mean(axis=0), [[0.0, 0.0, 1.0]])
+
+
 def _exchange() -> None:
     # Not by view_factors, which needs SciPy.
     for accelerator in (Octree.from_mesh(_FACING), BruteForce.from_mesh(_FACING)):
@@ -147,6 +166,12 @@ def _search() -> None:
 def _render(material: Material = _GLASS) -> None:
     # Brute force, so that no tree is built.
     render(_scene(material), resolution=(1, 1), accelerator="brute")
+
+
+def _render_copies(material: Material = _GLASS) -> None:
+    # So many faces in all that the mesh is kept once.
+    ball = SceneObject(mesh=icosphere(4), material="its")
+    render(_scene(material, *[ball] * 6), resolution=(1, 1))
 
 
 def _view() -> None:
@@ -170,16 +195,19 @@ _QUERIES = (
     Part("steps of a search", _count_steps),
     Part("winding numbers", _wind),
     Part("studies", _study),
+    Part("scenes of instances", _place),
 )
 _PICTURES = (
     Part("pictures", _render),
     Part("pictures with textures", partial(_render, _GLOWING)),
+    Part("pictures of copies", _render_copies),
+    Part("pictures of copies with textures", partial(_render_copies, _GLOWING)),
     Part("the viewer", _view),
 )
 # By the name of the command's option.
 PARTS: dict[str, tuple[Part, ...]] = {
     "queries": _QUERIES,
-    "pictures": (*_QUERIES, *_PICTURES[:2]),
+    "pictures": (*_QUERIES, *_PICTURES[:-1]),
     "all": (*_QUERIES, *_PICTURES),
 }
 
@@ -266,11 +294,11 @@ def _end_with_input() -> None:
     os._exit(1)
 
 
-def _scene(material: Material) -> Scene:
-    """One triangle before the eye; for glass, every kind of ray may occur."""
+def _scene(material: Material, *objects: SceneObject) -> Scene:
+    """Objects of ``material``, or one triangle of it, before the eye; for glass, every kind of ray may occur."""
     return Scene(
         camera=PerspectiveCamera(type="perspective", eye=(0.1, 0.1, 1.0), target=(0.1, 0.1, 0.0)),
         materials={"its": material},
         lights=(PointLight(type="point", position=(0.0, 0.0, 2.0), intensity=(1.0, 1.0, 1.0)),),
-        objects=(SceneObject(mesh=_TRIANGLE, material="its"),),
+        objects=objects or (SceneObject(mesh=_TRIANGLE, material="its"),),
     )
