@@ -5,7 +5,8 @@ Numba compiles in only one thread of a process, so a second process halves the w
 
 import os
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from logging import getLogger
 from pathlib import Path
@@ -241,26 +242,40 @@ def touch_viewing(prepared: PreparedScene) -> None:
 
 def compile_in_two(textures: bool = False) -> None:
     """Before a first picture, or one with ``textures``: compile the kernels that build trees and what the others search
-    carefully with here, and those that render in another process.
-
-    Does nothing if they are on disk. If the other process fails, its last line of output is logged, and its kernels are
-    compiled here when needed.
+    carefully with here, and those that render in another process. Does nothing if they are on disk.
     """
     if is_on_disk(render_tile) or available_threads() < 2:
         return
-    log = getLogger("renderer.jit")
-    log.info("compiling render_tile in another process meanwhile (once)")
+    getLogger("renderer.jit").info("compiling render_tile in another process meanwhile (once)")
+    with _beside("compile_textured_picture" if textures else "compile_picture"):
+        # First what the other process needs later than this one has it.
+        BruteForce.from_mesh(_TRIANGLE).closest_hit([0.1, 0.1, 0.0], [0.0, 0.0, 1.0], leaving=0)
+        _build()
+
+
+def compile_ahead_in_two(what: str, folder: Path | None, began: Callable[[str], object]) -> None:
+    """``compile_ahead``, while another process compiles the same parts from the last on; ``folder`` as chosen by
+    ``compile_into``.
+    """
+    with nullcontext() if available_threads() < 2 else _beside("compile_backwards", what, str(folder or "")):
+        compile_ahead(what, began)
+
+
+@contextmanager
+def _beside(function: str, *arguments: str) -> Iterator[None]:
+    """Another process calls a function of this module meanwhile.
+
+    If it fails, its last line of output is logged, and its kernels are compiled here when needed.
+    """
     with subprocess.Popen(
-        child.command(f"{__name__}:{'compile_textured_picture' if textures else 'compile_picture'}"),
+        child.command(f"{__name__}:{function}", *arguments),
         env=child.environment(**{QUIET_VARIABLE: "1"}),
         stdin=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     ) as other:
         try:
-            # First what the other process needs later than this one has it.
-            BruteForce.from_mesh(_TRIANGLE).closest_hit([0.1, 0.1, 0.0], [0.0, 0.0, 1.0], leaving=0)
-            _build()
+            yield
             # The child reads its input to the end, so that must stay open: no communicate().
             assert other.stderr is not None
             said = other.stderr.read().strip().splitlines()
@@ -269,15 +284,16 @@ def compile_in_two(textures: bool = False) -> None:
             other.terminate()
     if code != 0:
         last = f": {said[-1]}" if said else ""
-        log.warning("renderer: the process that compiles beside this one ended with exit code %s%s", code, last)
+        getLogger("renderer.jit").warning(
+            "renderer: the process that compiles beside this one ended with exit code %s%s", code, last
+        )
+
+
+# In a process of their own, which ends when its standard input does, for instance because the parent is gone.
 
 
 def compile_picture() -> None:
-    """Compile the kernels that render; no tree is built for it.
-
-    Call it only in a process of its own: it ends the process when standard input ends, for instance because the parent
-    is gone.
-    """
+    """Compile the kernels that render; no tree is built for it."""
     Thread(target=_end_with_input, daemon=True).start()
     _render()
 
@@ -286,6 +302,15 @@ def compile_textured_picture() -> None:
     """``compile_picture`` for scenes with textures."""
     Thread(target=_end_with_input, daemon=True).start()
     _render(_GLOWING)
+
+
+def compile_backwards(what: str, folder: str) -> None:
+    """``compile_ahead`` with the last part first, into ``folder`` unless it is ""."""
+    Thread(target=_end_with_input, daemon=True).start()
+    if folder:
+        compile_into(Path(folder))
+    for part in reversed(PARTS[what]):
+        part.call()
 
 
 def _end_with_input() -> None:

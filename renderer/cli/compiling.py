@@ -40,7 +40,7 @@ def _compile(options: argparse.Namespace) -> None:
 
     from renderer.jit.cache import lost, stored_in
     from renderer.jit.notice import compile_seconds
-    from renderer.precompile import PARTS, compile_ahead, compile_into
+    from renderer.precompile import PARTS, compile_ahead_in_two, compile_into
 
     if options.output is not None:
         compile_into(options.output)
@@ -51,7 +51,7 @@ def _compile(options: argparse.Namespace) -> None:
             bar.set_description(name)
             bar.update()
 
-        compile_ahead(options.what, began)
+        compile_ahead_in_two(options.what, options.output, began)
     if lost():
         raise OSError(f"{lost()} kernels were compiled but could not be saved: {options.output or 'no cache folder'}")
     if not options.quiet:

@@ -572,7 +572,7 @@ def test_compile_compiles_what_it_is_told_and_all_by_default(what: str | None, m
     from renderer import precompile
 
     asked_for: list[str] = []
-    monkeypatch.setattr(precompile, "compile_ahead", lambda what, began: asked_for.append(what))
+    monkeypatch.setattr(precompile, "compile_ahead_in_two", lambda what, folder, began: asked_for.append(what))
     assert main(["compile", "--quiet", *([f"--{what}"] if what else [])]) == 0
     assert asked_for == [what or "all"]
     parts = [set(map(str, precompile.PARTS[one])) for one in ("queries", "pictures", "all")]
@@ -584,7 +584,7 @@ def test_compile_is_quiet_on_a_terminal(monkeypatch: pytest.MonkeyPatch, capfd: 
     from renderer import precompile
     from renderer.cli import compiling
 
-    monkeypatch.setattr(precompile, "compile_ahead", lambda what, began: [began(str(part)) for part in "ab"])
+    monkeypatch.setattr(precompile, "compile_ahead_in_two", lambda what, folder, began: [*map(began, "ab")])
     monkeypatch.setattr(compiling, "on_terminal", lambda: True)
     assert main(["compile", "--quiet"]) == 0
     assert capfd.readouterr() == ("", "")

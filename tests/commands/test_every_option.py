@@ -299,11 +299,14 @@ def test_kernels_are_compiled_that_are_named_where_they_are_to_be(
     ahead = import_module("renderer.precompile")
     asked: list[Any] = []
     monkeypatch.setattr(ahead, "compile_into", lambda folder: asked.append(folder))
-    monkeypatch.setattr(ahead, "compile_ahead", lambda what, began: asked.append(what) or began("part"))
+    monkeypatch.setattr(
+        ahead, "compile_ahead_in_two", lambda what, folder, began: asked.append((what, folder)) or began("part")
+    )
     words = [f"--{what}"] if what else []
     words += ["-o", output] if output else []
     assert main(["compile", *words, *(["--quiet"] if quiet else [])]) == 0
-    assert asked == [*([Path(output)] if output else []), what or "all"]
+    folder = Path(output) if output else None
+    assert asked == [*([folder] if folder else []), (what or "all", folder)]
     said = capsys.readouterr().out
     assert said == "" if quiet else said.startswith("compiled in ") and ("in kernels" in said) == bool(output)
 

@@ -43,6 +43,13 @@ for name in ("three_models", "stairs", "glass"):
     face_colors(prepared.arrays, [0, 1, 5])
     ray_path(prepared, [0, 1, 5], [0, 0, -1], 2)
     visited(prepared.octree, [0, 1, 5], [0, 0, -1])
+from renderer import PerspectiveCamera, Phong, Scene, SceneObject
+from renderer.mesh.shapes import icosphere
+balls = [SceneObject(mesh=icosphere(4), material="grey", translate=(k, 0, 0)) for k in range(6)]
+copies = Scene(camera=PerspectiveCamera(eye=(0, 1, 9), target=(0, 0, 0)), materials={"grey": Phong()}, objects=balls)
+assert prepare_scene(copies, needs_of(copies), "octree").arrays.placed.size
+for options in ({}, {"split": "midpoint", "samples": 4}):
+    render(copies, resolution=(3, 2), **options)
 vertices = np.random.default_rng(1).random((90, 3))
 for points in (vertices, vertices.astype(np.float32)):
     for target in (Octree(points, np.arange(90).reshape(-1, 3)), BruteForce(points, np.arange(90).reshape(-1, 3))):
@@ -117,6 +124,23 @@ for tree in trees:
             view_factors(tree, groups, sides=sides, transmittance=shares, **few)
             view_factors(tree, groups, sides=sides, transmittance=shares, form="rays", max_rays=8)
             view_factors_from(tree, corners[:9], -corners[:9], groups, sides=sides, transmittance=shares, **few)
+from renderer import RayScene
+places = np.stack([np.eye(3, 4), np.eye(3, 4) * 2.0])
+for one in meshes:
+    scene, size = RayScene(), float(one.vertices.max())
+    scene.add(one, places)
+    for count in (1, 9, 100):
+        a, b = rng.normal(size=(2, count, 3)) * size
+        hits = scene.closest_hit(a, -a)
+        met = np.nan_to_num(hits.points)
+        for query in (scene.closest_hit, scene.any_hit, scene.all_hits, scene.count_hits):
+            query(a, b), query(a, -a, mask=np.arange(count), faces="front"), query(a, -a, ignore=hits)
+            query(met, a, leaving=hits), query(met, -a, leaving=hits.through())
+        scene.closest_hit(a, b, t_error=True), scene.count_steps(a, b)
+        scene.contains(a), scene.contains(a, winding=True), scene.closest_point(a), scene.signed_distance(a)
+        for at in (a[0], scene.merged.triangles[0].mean(axis=0)):
+            occlusion(scene, at, None, b), scan(scene, at, b), visible_faces(scene, at)
+    scene.move(0, places + 1.0), scene.refit(0, one.vertices * 1.5), scene.closest_hit(a, b)
 public = {name for name, value in vars(Queries).items() if callable(value) and not name.startswith("_")}
 assert public == asked, public ^ asked
 print(len(before), *sorted(signatures() - before))
@@ -137,7 +161,9 @@ from renderer.cli import main as cli
 choose = cli.choose_processor
 def choose_and_ask_less(*options):
     choose(*options)  # before Numba is imported
+    from renderer import precompile
     from renderer.precompile import PARTS
+    precompile.available_threads = lambda: 1  # another process would compile all
     PARTS["queries"] = [p for p in PARTS["queries"] if p.name in ("build", "refit", "a few rays", "many rays")]
 cli.choose_processor = choose_and_ask_less
 sys.exit(cli.main(sys.argv[1:]))

@@ -2,6 +2,8 @@
 
 import os
 import sys
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -14,6 +16,8 @@ from renderer.system import child
 ROOT = Path(__file__).parents[2]
 TELL = """
 import sys
+from functools import partial
+from importlib import import_module
 def tell(*arguments):
     import renderer
     print(renderer.__file__, *arguments, *[repr(p) for p in sys.path if not p or not p.startswith("/")])
@@ -66,3 +70,24 @@ def test_a_child_that_fails_is_said_with_its_last_words(monkeypatch, caplog):
     assert record.levelname == "WARNING"
     told = "renderer: the process that compiles beside this one ended with exit code 1: OSError: no room"
     assert record.getMessage() == told
+
+
+@pytest.mark.parametrize("folder", [None, "kernels"])
+def test_the_process_beside_compiles_the_same_parts_from_the_last_on(monkeypatch, tmp_path, folder):
+    """Told what and where to by its command."""
+    called, chosen, began = [], [], []
+    parts = tuple(precompile.Part(name, partial(called.append, name)) for name in "abc")
+    monkeypatch.setitem(precompile.PARTS, "queries", parts)
+    monkeypatch.setattr(precompile, "available_threads", lambda: 2)
+    monkeypatch.setattr(precompile, "compile_into", chosen.append)
+    monkeypatch.setattr(precompile, "_end_with_input", lambda: None)
+
+    def called_here(target, *arguments):
+        module, _, function = target.partition(":")
+        getattr(import_module(module), function)(*arguments)
+        return [sys.executable, "-c", ""]
+
+    monkeypatch.setattr(child, "command", called_here)
+    precompile.compile_ahead_in_two("queries", folder and tmp_path / folder, began.append)
+    assert called == ["c", "b", "a", "a", "b", "c"] and began == ["a", "b", "c"]
+    assert chosen == ([tmp_path / folder] if folder else [])
