@@ -1,4 +1,4 @@
-"""Compiles kernels ahead, for CI, container images and copied folders; and in two processes before a first picture.
+"""Compiles kernels in two processes: ahead, for CI, container images and copied folders, and before a first picture.
 
 Numba compiles in only one thread of a process, so a second process halves the wait.
 """

@@ -160,6 +160,7 @@ def check_closest_hit(got: Any, rays: Rays, t: Floats, options: dict[str, Any]) 
     first = [row[:1] for row in rows_of(t)]
     check_hits(got, rays, t, first, options, got.face.shape)
     np.testing.assert_array_equal(got.face.ravel(), [row[0] if len(row) else -1 for row in first])
+    assert (got.side[got.face < 0] == 0).all()
 
 
 def check_all_hits(got: Any, rays: Rays, t: Floats, options: dict[str, Any]) -> None:
