@@ -5,7 +5,7 @@ Numba compiles in only one thread of a process, so a second process halves the w
 
 import os
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from functools import partial
 from logging import getLogger
@@ -247,7 +247,8 @@ def compile_in_two(textures: bool = False) -> None:
     if is_on_disk(render_tile) or available_threads() < 2:
         return
     getLogger("renderer.jit").info("compiling render_tile in another process meanwhile (once)")
-    with _beside("compile_textured_picture" if textures else "compile_picture"):
+    # No tree is built for either.
+    with _beside(["pictures with textures" if textures else "pictures"]):
         # First what the other process needs later than this one has it.
         BruteForce.from_mesh(_TRIANGLE).closest_hit([0.1, 0.1, 0.0], [0.0, 0.0, 1.0], leaving=0)
         _build()
@@ -257,18 +258,19 @@ def compile_ahead_in_two(what: str, folder: Path | None, began: Callable[[str], 
     """``compile_ahead``, while another process compiles the same parts from the last on; ``folder`` as chosen by
     ``compile_into``.
     """
-    with nullcontext() if available_threads() < 2 else _beside("compile_backwards", what, str(folder or "")):
+    backwards = [part.name for part in reversed(PARTS[what])]
+    with nullcontext() if available_threads() < 2 else _beside(backwards, folder):
         compile_ahead(what, began)
 
 
 @contextmanager
-def _beside(function: str, *arguments: str) -> Iterator[None]:
-    """Another process calls a function of this module meanwhile.
+def _beside(names: Sequence[str], folder: Path | None = None) -> Iterator[None]:
+    """Another process compiles the parts of these names meanwhile, into ``folder`` or where this one does by itself.
 
     If it fails, its last line of output is logged, and its kernels are compiled here when needed.
     """
     with subprocess.Popen(
-        child.command(f"{__name__}:{function}", *arguments),
+        child.command(f"{__name__}:compile_parts", str(folder or ""), *names),
         env=child.environment(**{QUIET_VARIABLE: "1"}),
         stdin=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -289,28 +291,18 @@ def _beside(function: str, *arguments: str) -> Iterator[None]:
         )
 
 
-# In a process of their own, which ends when its standard input does, for instance because the parent is gone.
+def compile_parts(folder: str, *names: str) -> None:
+    """Compile the parts of these names, into ``folder`` unless it is "".
 
-
-def compile_picture() -> None:
-    """Compile the kernels that render; no tree is built for it."""
-    Thread(target=_end_with_input, daemon=True).start()
-    _render()
-
-
-def compile_textured_picture() -> None:
-    """``compile_picture`` for scenes with textures."""
-    Thread(target=_end_with_input, daemon=True).start()
-    _render(_GLOWING)
-
-
-def compile_backwards(what: str, folder: str) -> None:
-    """``compile_ahead`` with the last part first, into ``folder`` unless it is ""."""
+    Call it only in a process of its own: it ends the process when standard input ends, for instance because the parent
+    is gone.
+    """
     Thread(target=_end_with_input, daemon=True).start()
     if folder:
         compile_into(Path(folder))
-    for part in reversed(PARTS[what]):
-        part.call()
+    parts = {part.name: part for part in PARTS["all"]}
+    for name in names:
+        parts[name].call()
 
 
 def _end_with_input() -> None:

@@ -232,7 +232,6 @@ def test_another_numba_that_fits_is_used_without_a_word_and_keeps_its_kernels(tm
 
 PLAIN_AFTER_OURS = """
 import sys
-import time
 import numpy as np
 from numba import njit
 from renderer import Octree

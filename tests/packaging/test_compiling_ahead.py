@@ -125,9 +125,26 @@ for tree in trees:
             view_factors(tree, groups, sides=sides, transmittance=shares, **few)
             view_factors(tree, groups, sides=sides, transmittance=shares, form="rays", max_rays=8)
             view_factors_from(tree, corners[:9], -corners[:9], groups, sides=sides, transmittance=shares, **few)
-from renderer import RayScene
+public = {name for name, value in vars(Queries).items() if callable(value) and not name.startswith("_")}
+assert public == asked, public ^ asked
+print(len(before), *sorted(signatures() - before))
+"""
+    count, *new = output(SIGNATURES + script).splitlines()[-1].split(maxsplit=1)
+    assert int(count) > 20 and not new
+
+
+def test_kernels_of_queries_are_those_of_every_query_of_a_scene():
+    script = """
+import numpy as np
+from renderer.precompile import compile_ahead
+compile_ahead("queries")
+before = signatures()
+from renderer import Mesh, RayScene
+from renderer.mesh.shapes import icosphere
+from renderer.studies import occlusion, scan, visible_faces
+ball, rng = icosphere(3), np.random.default_rng(1)
 places = np.stack([np.eye(3, 4), np.eye(3, 4) * 2.0])
-for one in meshes[:2]:
+for one in (ball, Mesh(ball.vertices.astype(np.float32), ball.faces)):
     scene, size = RayScene(), float(one.vertices.max())
     scene.add(one, places)
     for count in (1, 9, 100):
@@ -142,8 +159,6 @@ for one in meshes[:2]:
         for at in (a[0], scene.merged.triangles[0].mean(axis=0)):
             occlusion(scene, at, None, b), scan(scene, at, b), visible_faces(scene, at)
     scene.move(0, places + 1.0), scene.refit(0, one.vertices * 1.5), scene.closest_hit(a, b)
-public = {name for name, value in vars(Queries).items() if callable(value) and not name.startswith("_")}
-assert public == asked, public ^ asked
 print(len(before), *sorted(signatures() - before))
 """
     count, *new = output(SIGNATURES + script).splitlines()[-1].split(maxsplit=1)

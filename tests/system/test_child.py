@@ -16,8 +16,6 @@ from renderer.system import child
 ROOT = Path(__file__).parents[2]
 TELL = """
 import sys
-from functools import partial
-from importlib import import_module
 def tell(*arguments):
     import renderer
     print(renderer.__file__, *arguments, *[repr(p) for p in sys.path if not p or not p.startswith("/")])
@@ -77,7 +75,8 @@ def test_the_process_beside_compiles_the_same_parts_from_the_last_on(monkeypatch
     """Told what and where to by its command."""
     called, chosen, began = [], [], []
     parts = tuple(precompile.Part(name, partial(called.append, name)) for name in "abc")
-    monkeypatch.setitem(precompile.PARTS, "queries", parts)
+    for what in ("queries", "all"):
+        monkeypatch.setitem(precompile.PARTS, what, parts)
     monkeypatch.setattr(precompile, "available_threads", lambda: 2)
     monkeypatch.setattr(precompile, "compile_into", chosen.append)
     monkeypatch.setattr(precompile, "_end_with_input", lambda: None)

@@ -83,7 +83,7 @@ def test_a_thread_other_than_the_main_one_changes_nothing():
 
 def test_what_compiles_beside_ends_with_its_parent(tmp_path):
     """Killed, a parent cannot end its child; the child then reads the end of its input."""
-    command = [sys.executable, "-c", "from renderer.precompile import compile_picture; compile_picture()"]
+    command = [sys.executable, "-c", "from renderer.precompile import compile_parts; compile_parts('', 'pictures')"]
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     child = subprocess.Popen(command, cwd=ROOT, env=environment, stdin=subprocess.PIPE, stderr=subprocess.DEVNULL)
     try:
