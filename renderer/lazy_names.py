@@ -6,6 +6,8 @@ import sys
 from collections.abc import Callable
 from importlib import import_module
 
+from renderer.collector import resting
+
 _LINE = re.compile(r"^from (\.[\w.]*) import (\w+) as \2$", re.MULTILINE)
 
 
@@ -25,7 +27,8 @@ def attach_stub(package: str) -> tuple[Callable[[str], object], Callable[[], lis
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         home = homes[name]
-        value = import_module(f".{name}", package) if home == "." else getattr(import_module(home, package), name)
+        with resting():
+            value = import_module(f".{name}", package) if home == "." else getattr(import_module(home, package), name)
         setattr(sys.modules[package], name, value)
         return value
 

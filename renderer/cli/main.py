@@ -8,14 +8,17 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from renderer import __version__
-from renderer.cli.compiling import add_compile, choose_processor
-from renderer.cli.info import add_info
-from renderer.cli.radiosity import add_radiosity
-from renderer.cli.render import add_render
-from renderer.cli.study import add_study
-from renderer.cli.view import add_view
+from renderer.collector import resting
 from renderer.system.interrupt import interruptible
 from renderer.system.terminal import flush_output, give_up_output, one_line, spell_everything
+
+with resting():
+    from renderer.cli.compiling import add_compile, choose_processor
+    from renderer.cli.info import add_info
+    from renderer.cli.radiosity import add_radiosity
+    from renderer.cli.render import add_render
+    from renderer.cli.study import add_study
+    from renderer.cli.view import add_view
 
 
 @interruptible("octree-render: interrupted")

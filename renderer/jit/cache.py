@@ -25,6 +25,7 @@ from numba.core import config
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
+from renderer.collector import resting
 from renderer.jit.digest import PACKAGE, is_ours
 from renderer.jit.levels import AHEAD_VARIABLE, LEVELS, lacking
 from renderer.jit.notice import warn_once
@@ -102,10 +103,11 @@ class KernelStore:
         if not self.knows(signature):
             return None
         for path, key in self._places(signature, context.codegen().magic_tuple()):
-            payload = _read(path, key)
-            if payload is not None:
-                with _tolerant(path):
-                    return self._rebuilt(signature, context, payload)
+            with resting():
+                payload = _read(path, key)
+                if payload is not None:
+                    with _tolerant(path):
+                        return self._rebuilt(signature, context, payload)
         return None
 
     def _rebuilt(self, signature: Any, context: Any, payload: Any) -> CompileResult | None:

@@ -40,6 +40,7 @@ from numba.extending import register_model
 from renderer.jit.apart import ApartStore, write_symbol
 from renderer.jit.cache import KernelStore
 from renderer.jit.contexts import PieceTarget, piece_typing
+from renderer.jit.entry import Entry
 from renderer.jit.libraries import EntryLibrary, PieceLibrary
 from renderer.jit.notice import compiling
 from renderer.jit.pieces import PieceStore
@@ -251,6 +252,7 @@ class _Piece(CPUDispatcher):  # type: ignore[misc]
         with global_compiler_lock, self._compiling_counter:
             found = self.overloads.get(arguments) or self._cache.load_overload(arguments, self.targetctx)
             if found is None:
+                self._compilation_chain_init_hook()
                 self._cache_misses[arguments] += 1
                 found = self._compiler.compile(arguments, None)
                 self.add_overload(found)
@@ -325,7 +327,7 @@ class Kernel:
     @lazy
     def entry(self) -> Any:
         """The dispatcher that Python calls."""
-        entry = CPUDispatcher(self.py_func, targetoptions=self._options, pipeline_class=_EntryCompiler)
+        entry = Entry(self.py_func, targetoptions=self._options, pipeline_class=_EntryCompiler)
         if self.kept:
             entry._cache = self.store
         return entry

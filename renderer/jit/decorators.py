@@ -11,7 +11,10 @@ from functools import cache
 from logging import getLogger
 from typing import Any
 
-import numba
+from renderer.collector import resting
+
+with resting():
+    import numba
 
 # The versions of Numba whose insides ``compiler`` was tested with; any other is tried before it is relied upon.
 _TESTED = ("0.68.",)

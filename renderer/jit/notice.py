@@ -4,12 +4,13 @@ The line comes from the logger ``renderer.jit`` at level WARNING, which Python p
 ``logging.getLogger("renderer").setLevel("ERROR")`` or the environment variable OCTREE_RENDERER_QUIET=1 turns it off.
 """
 
-import gc
 import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from logging import getLogger
+
+from renderer.collector import resting
 
 QUIET_VARIABLE = "OCTREE_RENDERER_QUIET"
 _LOG = getLogger("renderer.jit")
@@ -62,22 +63,10 @@ def compiling(name: str, folder: str | None) -> Iterator[None]:
     _Clock.kernels += 1
     _Clock.under_way += 1
     began = time.perf_counter()
-    # Numba makes millions of objects that stay: looking for cycles among them takes 6 % of the time, and later 4 %.
-    collects = gc.isenabled()
-    gc.disable()
     try:
-        yield
+        with resting():
+            yield
     finally:
-        if collects:
-            _make_old()
-            gc.enable()
         _Clock.under_way -= 1
         if _Clock.under_way == 0:
             _Clock.seconds += time.perf_counter() - began
-
-
-def _make_old() -> None:
-    """Move all objects to the garbage collector's oldest generation, unless somebody has frozen some."""
-    if gc.get_freeze_count() == 0:
-        gc.freeze()
-        gc.unfreeze()

@@ -10,6 +10,8 @@ from threading import current_thread, main_thread
 from types import FrameType
 from typing import Protocol
 
+from renderer.collector import spare_at_exit
+
 # The usual code of a shell for a process that SIGINT ended.
 INTERRUPTED = 130
 # The signals of a job's time limit and of a terminal that is closed. Unhandled, they would leave temporary files.
@@ -29,6 +31,8 @@ def interruptible(message: str) -> Callable[[Command], Command]:
         @wraps(command)
         def run(arguments: Sequence[str] | None = None) -> int:
             own_process, ended_by, code = arguments is None, list[int](), INTERRUPTED
+            if own_process:
+                spare_at_exit()
             try:
                 with _ends_clean(ended_by, own_process), ends_while_compiling(message, own_process):
                     code = command(arguments)

@@ -74,6 +74,19 @@ import scipy.linalg
     output(script)
 
 
+@pytest.mark.parametrize("arguments", ["", "['info', 'missing.ply']"])
+def test_only_a_command_of_its_own_process_ends_without_a_last_collection(arguments):
+    """It would take a fifth of the time of a small picture; in a user's process it may close files."""
+    script = f"""
+import atexit, gc, sys
+from renderer.cli.main import main
+atexit.register(lambda: print(gc.get_freeze_count() > 0))
+sys.argv = ["octree-render", "info", "missing.ply"]
+assert main({arguments}) == 2
+"""
+    assert output(script) == f"{not arguments}\n"
+
+
 def test_the_kernel_is_loaded_before_a_picture_takes_its_memory():
     """Where there is none left to load it, LLVM ends the process."""
     script = """
