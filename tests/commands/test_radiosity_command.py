@@ -96,7 +96,7 @@ def radiance(**options: Any) -> Any:
     ("words", "given"),
     [
         ([], {}),
-        (["--edge", "0.4"], {"edge": 0.4}),
+        (["--edge", "0.5"], {"edge": 0.5}),
         (["--rtol", "0.5"], {"rtol": 0.5}),
         (["--max-rays", "256"], {"max_rays": 256}),
         (["--crease", "100"], {"crease": 100.0}),
@@ -104,8 +104,8 @@ def radiance(**options: Any) -> Any:
     ],
 )
 def test_a_picture_is_that_of_the_lit_scene(folder: Path, words: list[str], given: dict[str, Any]) -> None:
-    usual = {"edge": 0.3, "rtol": 0.01}
-    run("--edge", 0.3, "--rtol", 0.01, *words, "-o", "a.npy")
+    usual = {"edge": 0.45, "rtol": 0.01}
+    run("--edge", 0.45, "--rtol", 0.01, *words, "-o", "a.npy")
     expected = radiance(**{**usual, **given})
     assert np.array_equal(np.load("a.npy"), expected)
     assert np.array_equal(expected, radiance(**usual)) == (given.keys() <= {"threads"})

@@ -15,7 +15,7 @@ from renderer.distance.rational import nearest_exactly
 from renderer.inside import contains as inside
 from renderer.mesh.shapes import box, icosphere, torus
 from validation.oracle.distance import nearest, ulps_from_root
-from validation.oracle.vectors import rational
+from validation.oracle.vectors import rational, relative
 from validation.queries.distances import points_about
 from validation.stability.cases.queries.inside import closed_solids
 
@@ -28,18 +28,33 @@ SOLIDS = closed_solids()
 FIELDS = ("distance", "face", "u", "v")
 
 
+def exactly(point, mesh, faces=None):
+    """The least squared distance, and the faces that have it; of all or of some, without those that are too far off."""
+    faces = np.arange(len(mesh.faces)) if faces is None else np.asarray(faces)
+    # Of size 1, so that no square overflows: no nearer than their boxes, and no farther than their corners.
+    corners = mesh.triangles[faces] - point
+    corners /= np.abs(corners).max() or 1.0
+    beyond = np.maximum(np.maximum(corners.min(axis=1), -corners.max(axis=1)), 0.0)
+    most = np.linalg.norm(corners, axis=2).min()
+    near = faces[np.linalg.norm(beyond, axis=1) <= most + 1e-9]
+    triangles, unit = relative(point.tolist(), mesh.triangles[near].tolist())
+    square, least = nearest([0, 0, 0], triangles)
+    return square / unit**2, near[least].tolist()
+
+
 def assert_nearest(mesh, points):
-    """Each distance is the exact one, rounded, and the face the first that is so near."""
-    found = Octree.from_mesh(mesh).closest_point(points)
-    triangles = [rational(triangle) for triangle in mesh.triangles]
-    for i, point in enumerate(rational(points)):
-        square, faces = nearest(point, triangles)
+    """Each distance is the exact one, rounded, and the face the first that is so near; returns both faces."""
+    found, first = Octree.from_mesh(mesh).closest_point(points), []
+    for i, point in enumerate(points):
+        square, faces = exactly(point, mesh)
         # Half an ulp for the last rounding, and as little as twice the digits leave.
         assert ulps_from_root(found.distance[i], square) < 0.51
         if found.face[i] != faces[0]:
             # Another face is as near when rounded.
-            other = nearest(point, [triangles[found.face[i]]])[0]
+            other, _ = exactly(point, mesh, [found.face[i]])
             assert ulps_from_root(found.distance[i], other) < 0.51 and found.face[i] < faces[0]
+        first.append(faces[0])
+    return found.face.tolist(), first
 
 
 @cases("name", SOLIDS)
@@ -64,9 +79,8 @@ def test_faces_of_whole_numbers_with_lines_and_points_among_them(seed, step):
     corners = rng.integers(-3, 4, (30, 3)).astype(float)
     mesh = Mesh(corners, rng.integers(0, 30, (30, 3)))
     points = rng.integers(-4, 5, (20, 3)) * step
-    assert_nearest(mesh, points)
-    found, triangles = Octree.from_mesh(mesh).closest_point(points), [rational(t) for t in mesh.triangles]
-    assert found.face.tolist() == [nearest(point, triangles)[1][0] for point in rational(points)]
+    found, first = assert_nearest(mesh, points)
+    assert found == first
 
 
 def test_needles_err_by_no_more_than_promised():
@@ -75,10 +89,9 @@ def test_needles_err_by_no_more_than_promised():
     mesh = Mesh(rng.normal(size=(60, 3)) * [1, 1e-15, 1e-15], rng.integers(0, 60, (60, 3)))
     points = points_about(mesh, rng, 150)
     found = Octree.from_mesh(mesh).closest_point(points)
-    triangles = [rational(triangle) for triangle in mesh.triangles]
     reach = np.abs(points[:, None] - mesh.vertices).max(axis=(1, 2))
-    for i, point in enumerate(rational(points)):
-        square, _ = nearest(point, triangles)
+    for i, point in enumerate(points):
+        square, _ = exactly(point, mesh)
         exact = ulps_from_root(found.distance[i], square)
         assert exact < 0.51 or abs(found.distance[i] - float(square) ** 0.5) < 2.0**-90 * reach[i]
         assert (found.distance[i] == 0.0) == (square == 0)

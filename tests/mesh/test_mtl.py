@@ -31,7 +31,9 @@ shares = st.lists(st.floats(0, 1).map(lambda x: round(x, 4)), min_size=3, max_si
 
 @settings(deadline=None)
 @given(
-    st.dictionaries(st.text("ab_.-", min_size=1), st.tuples(shares, shares, shares, st.integers(0, 999)), min_size=1)
+    st.dictionaries(
+        st.text("ab_.-", min_size=1), st.tuples(shares, shares, shares, st.integers(0, 999)), min_size=1, max_size=3
+    )
 )
 def test_values_are_those_that_trimesh_reads(written: dict[str, Any]) -> None:
     lines = [

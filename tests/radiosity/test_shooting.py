@@ -79,7 +79,7 @@ def test_the_ambient_estimate_is_exact_where_light_is_even():
 
 @cases("lid", [True, False])
 def test_rows_by_rays_converge_to_the_solution_of_these_rows(lid):
-    octree, faces = room(lid=lid)
+    octree, faces = room(1.0, lid)
     n = len(faces)
     emission, rho, sky = np.where(faces == 0, 1.0, 0.0), np.where(faces % 2, 0.8, 0.3), 0.5
     shots = Shooting(octree, emission, rho, sky=sky, rtol=1e-10, max_rays=512)

@@ -23,12 +23,12 @@ def example() -> ModuleType:
 @pytest.fixture(scope="module")
 def written(example: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("quarter")
-    assert example.main([str(folder), "--buildings", "40"]) == 0
+    assert example.main([str(folder), "--buildings", "10"]) == 0
     return folder
 
 
 def test_figures_are_those_of_geometry_and_pictures_show_the_quarter(example: ModuleType, written: Path) -> None:
-    mesh, kinds = example.quarter(40)
+    mesh, kinds = example.quarter(10)
     sky, sun = np.load(written / "sky.npy"), np.load(written / "sun.npy")
     assert len(sky) == len(sun) == len(kinds) == len(mesh.faces)
     (_, flat, one), (_, pitched, tilted), (_, facade, half), (_, hours, day) = example.figures(kinds, sky, sun)

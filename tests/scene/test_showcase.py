@@ -33,7 +33,7 @@ def file_of(folder: Path, mesh: Mesh, scale: float = 1.0, offset: Any = (0, 0, 0
 @cases("offset", [(0, 0, 0), (30, -20, 10)])
 def test_the_whole_mesh_is_seen_and_lit_and_large_enough(tmp_path: Path, shape: str, scale: float, offset: Any) -> None:
     mesh = SHAPES[shape]
-    image = render(load_scene(file_of(tmp_path, mesh, scale, offset)), resolution=(80, 80))
+    image = render(load_scene(file_of(tmp_path, mesh, scale, offset)), resolution=(80, 80), samples=1)
     model = (image.face >= 0) & (image.face < len(mesh.faces))
     rows, columns = np.flatnonzero(model.any(axis=1)), np.flatnonzero(model.any(axis=0))
     assert rows[0] > 0 and columns[0] > 0 and rows[-1] < 79 and columns[-1] < 79

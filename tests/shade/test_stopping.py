@@ -4,7 +4,10 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -78,7 +81,7 @@ def file_of(folder: Path) -> Path:
 def rendered(scene: Any, **settings: Any) -> Image:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", CutWarning)
-        return render(scene, resolution=(50, 40), **settings)
+        return render(scene, **{"resolution": (50, 40), **settings})
 
 
 def same(a: Image, b: Image) -> bool:
@@ -89,7 +92,7 @@ def same(a: Image, b: Image) -> bool:
 
 def test_a_pixel_takes_its_rays_and_those_under_way() -> None:
     for budget in (1, 50, 200, 1000):
-        image = rendered(half_mirrors(), max_rays=budget, samples=4)
+        image = rendered(half_mirrors(), resolution=(25, 20), max_rays=budget, samples=4)
         # One ray waits a level at the most, and each brings a shadow ray.
         assert image.rays.max() <= 4 * (budget + 2 * 65)
         assert image.cut > 200
@@ -113,12 +116,13 @@ def test_pixels_that_are_not_cut_are_as_without_a_budget() -> None:
 
 @pytest.mark.parametrize("samples", [1, 4])
 def test_the_cut_depends_on_no_thread_tile_or_pause(monkeypatch: pytest.MonkeyPatch, samples: int) -> None:
-    expected = rendered(half_mirrors(), threads=1, samples=samples)
-    assert same(rendered(half_mirrors(), threads=3, samples=samples), expected)
-    ready = prepare(half_mirrors())
+    options = {"max_rays": 60, "samples": samples}
+    expected, ready = rendered(half_mirrors(), threads=1, **options), prepare(half_mirrors())
+    assert expected.cut > 1000
+    assert same(rendered(half_mirrors(), threads=3, **options), expected)
     monkeypatch.setattr(prepared_scene, "_bundles_in_a_row", lambda tree: 1)
     monkeypatch.setattr(camera_rays, "TILE", 16)
-    assert same(rendered(ready, threads=2, samples=samples), expected)
+    assert same(rendered(ready, threads=2, **options), expected)
 
 
 def test_finished_may_stop_a_tile_under_way() -> None:
@@ -143,9 +147,22 @@ SCRIPTS = {
 }
 
 
-@pytest.mark.parametrize("what", SCRIPTS)
-def test_control_c_stops_a_script_in_the_midst_of_it(what: str) -> None:
-    """Without a stop within tiles and chunks each of these goes on for minutes, and the test's time is over."""
+@contextmanager
+def ended_in_time(running: subprocess.Popen[str]) -> Iterator[None]:
+    """A process is killed, and so its output ends, where it takes more than a minute or is not as expected."""
+    timer = threading.Timer(60, running.kill)
+    timer.start()
+    try:
+        yield
+    except BaseException:
+        running.kill()
+        raise
+    finally:
+        timer.cancel()
+
+
+def test_control_c_stops_a_script_in_the_midst_of_it() -> None:
+    """Without a stop within tiles and chunks each of these goes on for minutes, and its time is over."""
     script = f"""
 import sys, warnings, signal
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -159,20 +176,20 @@ scene, rays = half_mirrors(), np.random.default_rng(1).normal(size=(10**6, 3)) *
 for accelerator in ("octree", "brute"):
     render(scene, resolution=(4, 4), max_rays=1, accelerator=accelerator)
 BruteForce.from_mesh(icosphere(1)).closest_hit(rays[:20000], -rays[:20000])
-try:
-    print("begins", flush=True)
-    {SCRIPTS[what]}
-except KeyboardInterrupt:
-    print("stopped", flush=True)
-"""
-    running = subprocess.Popen([sys.executable, "-P", "-c", script], stdout=subprocess.PIPE, text=True)
+for line in {list(SCRIPTS.values())!r}:
     try:
+        print("begins", flush=True)
+        exec(line)
+    except KeyboardInterrupt:
+        print("stopped", flush=True)
+"""
+    with subprocess.Popen([sys.executable, "-P", "-c", script], stdout=subprocess.PIPE, text=True) as running:
         assert running.stdout is not None
-        assert running.stdout.readline() == "begins\n"
-        running.send_signal(signal.SIGINT)
-        assert running.communicate(timeout=60)[0] == "stopped\n"
-    finally:
-        running.kill()
+        for what in SCRIPTS:
+            with ended_in_time(running):
+                assert running.stdout.readline() == "begins\n"
+                running.send_signal(signal.SIGINT)
+                assert running.stdout.readline() == "stopped\n", what
 
 
 INTERRUPTED = """
@@ -213,22 +230,32 @@ def test_the_command_line_says_what_was_cut_and_takes_a_budget(tmp_path: Path, c
     assert out.exists()
 
 
+# The command, which says when it has been in its tiles for a while.
+COMMAND = """
+import runpy
+from renderer.picture import prepare
+calls, kernel = [], prepare.render_tile
+def heard(*arguments):
+    calls.append(len(calls))
+    if calls[-1] == 20:
+        print("renders", flush=True)
+    return kernel(*arguments)
+prepare.render_tile = heard
+runpy.run_module("renderer", run_name="__main__", alter_sys=True)
+"""
+
+
 def test_control_c_ends_a_command_whose_first_tile_never_ends(tmp_path: Path) -> None:
-    command = [sys.executable, "-P", "-m", "renderer", "render", str(file_of(tmp_path)), "-o", str(tmp_path / "a.png")]
-    warm = [*command, "--resolution", "4x4", "--max-rays", "1", "--quiet"]
-    subprocess.run(warm, check=True, capture_output=True, timeout=120)
-    (tmp_path / "a.png").unlink()
+    words = ["render", str(file_of(tmp_path)), "-o", str(tmp_path / "a.png"), "--max-rays", str(2**61)]
     running = subprocess.Popen(
-        [*command, "--max-rays", str(2**61)], stderr=subprocess.PIPE, text=True,
+        [sys.executable, "-P", "-c", COMMAND, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler), env={**os.environ},
     )  # fmt: skip
-    try:
-        with pytest.raises(subprocess.TimeoutExpired):
-            running.wait(timeout=4)
+    with running, ended_in_time(running):
+        assert running.stdout is not None
+        assert running.stdout.readline() == "renders\n"
         running.send_signal(signal.SIGINT)
         said = running.communicate(timeout=60)[1]
-    finally:
-        running.kill()
     assert running.returncode == 130
     assert said == "octree-render: interrupted\n"
     assert not (tmp_path / "a.png").exists()

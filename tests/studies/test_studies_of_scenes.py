@@ -26,6 +26,7 @@ from renderer.trimesh_ray.distances import closest_point
 
 pytestmark = pytest.mark.judges("studies.occlusion", "studies.sky_view_factor", "trimesh_ray.RayMeshIntersector")
 
+RING = torus(around=16, across=8)
 CAMERA = PerspectiveCamera(eye=(4.0, -6.0, 5.0), target=(1.0, 1.0, 0.5), up=(0.0, 0.0, 1.0))
 SUNS = [[1.0, 0.5, 1.0], [0.0, -1.0, 2.0], [-1.0, 0.2, 0.3]]
 ANSWERS: dict[str, Callable[[Any, Any], Any]] = {
@@ -34,7 +35,7 @@ ANSWERS: dict[str, Callable[[Any, Any], Any]] = {
     "depth_map": lambda on, at: depth_map(on, CAMERA, 60, 40),
     "grid_points": lambda on, at: tuple(grid_points(on, 0.3)),
     "light through faces": lambda on, at: sky_view_factor(
-        on, at.points, at.normals, transmittance=np.linspace(0.0, 1.0, 12 * 3 + len(torus().faces))
+        on, at.points, at.normals, transmittance=np.linspace(0.0, 1.0, 12 * 3 + len(RING.faces))
     ),
     "occlusion": lambda on, at: occlusion(on, at.points, at.normals, tregenza().directions, packed=True),
     "openness": lambda on, at: openness(on, at.points, samples=50),
@@ -51,7 +52,7 @@ def court() -> RayScene:
     scene.add(box((-3, -3, -1), (5, 5, 0)))
     boxes = scene.add(box(), [[[c, -s, 0, x], [s, c, 0, y], [0, 0, 2, 0]] for c, s, x, y in places])
     scene.show(boxes, np.array([True, True, False]))
-    scene.add(torus(), [[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 3]])
+    scene.add(RING, [[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 3]])
     return scene
 
 
@@ -67,7 +68,7 @@ def test_a_study_of_a_scene_has_the_bits_of_its_merged_mesh(name: str) -> None:
         scene.move(2, [[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, height]])
         octree = Octree(scene.merged)
         places = face_points(octree.mesh)
-        assert len(octree.mesh.faces) == 12 * 3 + len(torus().faces)
+        assert len(octree.mesh.faces) == 12 * 3 + len(RING.faces)
         whole = octree.mesh if name in ("closest_point", "rays of trimesh") else octree
         ours, theirs = arrays(ANSWERS[name](scene, places)), arrays(ANSWERS[name](whole, places))
         for own, other in zip(ours, theirs, strict=True):

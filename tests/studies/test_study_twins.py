@@ -14,7 +14,7 @@ import pytest
 from array_forms import FORMS, shaped, shapes_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from twins import FACES, MESH, Floats, Integers, meetings
+from twins import FACES, MESH, Floats, Integers, dot, meetings
 
 from renderer import BruteForce, Mesh, Octree, studies
 from renderer.studies import (
@@ -57,18 +57,16 @@ class Places:
     def left(self, directions: Floats, asked: dict[str, Any]) -> Floats:
         """What is left of rays in directions (n, k, 3) behind all faces that they cross up to a distance."""
         shares, distance = asked.get("transmittance", np.zeros(FACES)), asked.get("max_distance", np.inf)
-        left = []
-        for ways, point, face, normal in zip(directions, self.points, self.faces, self.all_normals(), strict=True):
-            t = meetings(CORNERS, np.broadcast_to(point, ways.shape), ways)
-            t[:, face] = np.nan if face >= 0 else t[:, face]
-            met = (t >= 0.0) & (t * np.linalg.norm(ways, axis=1)[:, None] <= distance)
-            kept = np.where(met, shares, 1.0).prod(axis=1)
-            if normal.any():
-                side = np.sign(NORMALS[face] @ normal) if face >= 0 else 0.0
-                kept = np.where((ways @ NORMALS[face]) * side < 0.0, kept * shares[face], kept)
-                kept[ways @ normal <= 0.0] = 0.0
-            left.append(kept)
-        return np.stack(left)
+        places, ways = np.arange(len(self.points)).repeat(directions.shape[1]), directions.reshape(-1, 3)
+        parts = [slice(begin, begin + 1000) for begin in range(0, len(ways), 1000)]
+        t = np.concatenate([meetings(CORNERS, self.points[places[part]], ways[part]) for part in parts])
+        face, normal = self.faces[places], self.all_normals()[places]
+        t[face >= 0, face[face >= 0]] = np.nan
+        met = (t >= 0.0) & (t * np.linalg.norm(ways, axis=1)[:, None] <= distance)
+        kept = np.where(met, shares, 1.0).prod(axis=1)
+        side = np.where(face >= 0, np.sign(dot(NORMALS[face], normal)), 0.0)
+        kept = np.where(dot(ways, NORMALS[face]) * side < 0.0, kept * shares[face], kept)
+        return np.where(normal.any(axis=1) & (dot(ways, normal) <= 0.0), 0.0, kept).reshape(directions.shape[:2])
 
     def all_normals(self) -> Floats:
         return np.zeros_like(self.points) if self.normals is None else self.normals
@@ -208,7 +206,7 @@ def drawn(data: st.DataObject, study: str, places: Places) -> dict[str, Any]:
     known = inspect.signature(getattr(studies, study)).parameters
     needed = {name for name, p in known.items() if p.default is p.empty} - ELSEWHERE
     # The twin takes its time where many points look in as many directions as they do by default.
-    needed |= {"samples"} & known.keys() if len(places.points) > 40 else set()
+    needed |= {"samples"} & known.keys() if len(places.points) > 2 else set()
     chosen = needed | data.draw(st.sets(st.sampled_from(sorted(known.keys() - ELSEWHERE))))
     asked = {name: data.draw(OPTIONS[name]) for name in sorted(chosen)}
     if asked.get("packed"):

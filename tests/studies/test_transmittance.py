@@ -52,7 +52,7 @@ def court() -> tuple[Mesh, Any]:
     walls = box((-3, -3, -1), (3, 3, 2))
     open_box = Mesh(walls.vertices, walls.faces[walls.triangles[:, :, 2].min(axis=1) < 2.0])
     ball = icosphere(2).transformed(np.diag([0.7, 0.7, 0.7, 1.0]))
-    ring = torus().transformed([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1], [0, 0, 0, 1]])
+    ring = torus(around=16, across=8).transformed([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1], [0, 0, 0, 1]])
     mesh = Mesh.concatenate([open_box, ball, ring])
     return mesh, face_points(mesh)
 

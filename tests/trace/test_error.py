@@ -11,25 +11,28 @@ from renderer import BruteForce, Mesh, Octree
 from renderer.mesh.shapes import icosphere
 from validation.oracle import exact
 from validation.oracle.starts import start_near
-from validation.oracle.vectors import cross, difference, dot
+from validation.oracle.vectors import cross, difference, dot, whole
 
 pytestmark = pytest.mark.judges("AllHits", "Hits", "Octree.closest_hit")
 
 
 def true_t(corners, origin, direction):
     """Where a ray meets a face's plane, None where it is parallel."""
-    u, v, w, t = exact.determinants(corners, origin, direction)
-    return t / (u + v + w) if u + v + w else None
+    (o, a, b, c), place = whole([origin, *corners])
+    (d,), way = whole([direction])
+    normal = cross(difference(b, a), difference(c, a))
+    slope = dot(normal, d) * place
+    return Fraction(dot(normal, difference(a, o)) * way, slope) if slope else None
 
 
 def shares(octree, origins, directions, hits, rows):
     """The error of each hit as a share of its bound."""
-    found = []
-    for row, t, face, error in zip(rows, hits.t[hits.face >= 0], hits.face[hits.face >= 0],
-                                   hits.t_error[hits.face >= 0], strict=True):  # fmt: skip
-        true = true_t(octree.mesh.triangles[face], origins[row], directions[row])
+    found, hit = [], hits.face >= 0
+    columns = octree.mesh.triangles[hits.face[hit]], origins[rows], directions[rows], hits.t[hit], hits.t_error[hit]
+    for corners, origin, direction, t, error in zip(*(column.tolist() for column in columns), strict=True):
+        true = true_t(corners, origin, direction)
         if true is not None:
-            found.append(float(abs(Fraction(float(t)) - true)) / error)
+            found.append(float(abs(Fraction(t) - true)) / error)
     return np.array(found)
 
 

@@ -23,7 +23,7 @@ from renderer.trace.resolve import _meet_slab, resolve_uncertain
 from renderer.trace.trees import tree_pointers
 from validation.oracle import exact
 
-SIDE = 60
+SIDE = 36
 
 
 def flat_overlapping(count):

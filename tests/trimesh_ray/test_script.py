@@ -34,11 +34,18 @@ def test_the_script_runs_as_it_would_by_itself() -> None:
         assert (answers(*command)["name"], answers(*command)["arguments"]) == ("__main__", ["a", "--b"])
 
 
-def test_modules_are_looked_for_as_they_are_for_the_script_itself(tmp_path: Path) -> None:
+def test_a_script_finds_its_modules_has_its_own_options_and_exits_as_by_itself(tmp_path: Path) -> None:
     script = tmp_path / "script.py"
-    script.write_text("import json, sys; print(json.dumps(sys.path))")
-    plain, drop_in = (json.loads(ran(*command, str(script)).stdout) for command in ((), DROP_IN))
-    assert drop_in == plain and plain[0] == str(tmp_path.resolve())
+    (tmp_path / "neighbour.py").write_text("word = 'beside the script'\n")
+    lines = ("import json, neighbour, sys", "import trimesh.proximity as p", "words = [sys.argv[1:], neighbour.word]",
+             "print(json.dumps([sys.path, words, p.closest_point.__module__]))", "sys.exit(3)")  # fmt: skip
+    script.write_text("\n".join(lines))
+    options = ["x", "--proximity", "--help", "-h"]
+    plain, drop_in = (ran(*command, str(script), *options) for command in ((), DROP_IN))
+    assert drop_in.stdout == plain.stdout and drop_in.returncode == plain.returncode == 3
+    path, words, module = json.loads(plain.stdout)
+    assert path[0] == str(tmp_path.resolve())
+    assert words == [options, "beside the script"] and module == "trimesh.proximity"
 
 
 def faults(found: dict[str, Any]) -> dict[str, bool]:
@@ -71,10 +78,6 @@ def test_one_added_line_does_the_same(tmp_path: Path) -> None:
 
 def test_a_script_that_fails_fails_as_by_itself(tmp_path: Path) -> None:
     script = tmp_path / "fails.py"
-    script.write_text("import neighbour\nimport sys\nprint(neighbour.word)\nsys.exit(3)\n")
-    (tmp_path / "neighbour.py").write_text("word = 'beside the script'\n")
-    done = ran(*DROP_IN, str(script))
-    assert (done.returncode, done.stdout) == (3, "beside the script\n")
     script.write_text("raise KeyError('mine')\n")
     done = ran(*DROP_IN, str(script))
     assert done.returncode == 1 and "KeyError: 'mine'" in done.stderr
@@ -88,13 +91,6 @@ def test_no_script_is_said(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captu
     monkeypatch.setattr(sys, "argv", ["renderer.trimesh_ray", "--help"])
     main()
     assert "Run a script" in capsys.readouterr().out
-
-
-def test_a_script_has_its_own_options(tmp_path: Path) -> None:
-    script = tmp_path / "s.py"
-    script.write_text("import sys, trimesh.proximity as p; print(sys.argv[1:], p.closest_point.__module__)")
-    options = ["x", "--proximity", "--help", "-h"]
-    assert ran(*DROP_IN, str(script), *options).stdout == f"{options} trimesh.proximity\n"
 
 
 def test_a_tree_keeps_the_faces_that_it_was_built_from() -> None:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -76,7 +77,10 @@ def test_a_film_refuses_what_it_cannot_judge(name: str, why: str) -> None:
         Film(scene, 8)
 
 
-def test_sampling_and_truncation_fall_and_arithmetic_is_small() -> None:
+@pytest.mark.usefixtures("built_once")
+def test_sampling_and_truncation_fall_and_arithmetic_is_small(monkeypatch: pytest.MonkeyPatch) -> None:
+    for who in ("ours", "theirs"):  # the same picture is drawn once
+        monkeypatch.setattr(tradeoff_pictures.Bench, who, cache(getattr(tradeoff_pictures.Bench, who)))
     costs: dict[str, float] = {}
     scene = load_scene(SCENES / "mirrors.toml")
     (record, split), _ = stored(tradeoff_pictures.run(scene, "mirrors", PICTURES, costs), costs)

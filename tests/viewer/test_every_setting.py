@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import tomlkit
 from cases import cases
-from varied import BASE, VARIATIONS, Table, Variation, picture, scene_of
+from varied import BASE, VARIATIONS, Table, Variation, picture, scene_of, written
 from viewer_client import decoded
 from viewer_ways import (
     INSIDE,
@@ -213,7 +213,7 @@ def test_the_files_settings_hold_in_every_band(
 def of_file(folder: Path, other: Variation) -> Case:
     """The scene of a file with that field, with the settings that a page takes over."""
     path = folder / "other.toml"
-    path.write_text(tomlkit.dumps(other.varied()))
+    path.write_text(written(folder, other.varied()).read_text())
     shown = open_file(path)
     return Case(shown, page_of(shown.scene), shown.scene).seen()
 

@@ -66,21 +66,21 @@ def test_a_picture_at_rest_grows_to_the_renderers_of_many_samples(
     client: Client, scene: Path, monkeypatch: pytest.MonkeyPatch, banded: bool
 ) -> None:
     if banded:
-        monkeypatch.setattr(passes, "BAND_PIXELS", 10_000)
-    got, told = grown(client, 64)
+        monkeypatch.setattr(passes, "BAND_PIXELS", 3_000)
+    got, told = grown(client, 64, w=64, h=75)
     assert [message["samples"] for message in told] == [4, 16, 64]
-    full = [p for p in got if p.w == 200]
-    number = 5 if banded else 1
+    full = [p for p in got if p.w == 64]
+    number = 3 if banded else 1
     assert len(full) == 4 * number and all(p.last == ((i + 1) % number == 0) for i, p in enumerate(full))
     for i, samples in enumerate((1, 4, 16, 64)):
         seen = np.concatenate([p.rgb for p in full[i * number : (i + 1) * number]])
-        assert np.array_equal(seen, srgb(rendered(load_scene(scene), samples=samples).radiance))
+        assert np.array_equal(seen, srgb(rendered(load_scene(scene), resolution=(64, 75), samples=samples).radiance))
 
 
 def test_the_error_that_is_told_is_near_the_one_that_is_left(client: Client, scene: Path) -> None:
     """By a picture of 1,024 samples, whose own error is a quarter of that of 64 at the most."""
-    got, told = grown(client, 64, w=80, h=60)
-    truth = srgb(rendered(load_scene(scene), resolution=(80, 60), samples=1024).radiance).astype(float)
+    got, told = grown(client, 64, w=40, h=30)
+    truth = srgb(rendered(load_scene(scene), resolution=(40, 30), samples=1024).radiance).astype(float)
     for message, picture in zip(told, got[-3:], strict=True):
         left = float(np.sqrt(np.mean((picture.rgb - truth) ** 2)))
         # An estimate that errs towards more: by twice where errors fall as the number of samples instead of its root.
@@ -98,7 +98,7 @@ def test_what_cannot_grow_ends_as_before(client: Client, settings: dict[str, Any
 
 
 def test_a_newer_view_comes_before_a_finer_picture(client: Client) -> None:
-    old = client.view(w=1000, h=1000, settings={"refine": 64})
+    old = client.view(w=500, h=500, settings={"refine": 64})
     client.passes(old)
     new = client.view(w=64, h=64)
     assert [got.seq for got in client.passes(new)][-1] == new

@@ -18,7 +18,7 @@ from viewer_client import PATIENCE, Client, Got, looking, rendered, wait_for
 import renderer
 from renderer import load_scene
 from renderer.picture.image import srgb
-from renderer.viewer import compare
+from renderer.viewer import compare, session
 from renderer.viewer.compare import Comparison, Way, heat_map
 
 WAYS = (Way("one", 1), Way("other", 1))
@@ -247,17 +247,18 @@ def test_mitsubas_recursion_is_offered_by_the_project() -> None:
 
 
 def test_a_click_tells_both_values_and_both_rays(client: Client) -> None:
-    pick = {"type": "pick", "x": 120, "y": 90, **looking((0.5, 2.6, 5.5)), "w": 200, "h": 150}
+    size = {"w": 100, "h": 75}
+    pick = {"type": "pick", "x": 60, "y": 45, **looking((0.5, 2.6, 5.5)), **size}
     client.send(**pick, seq=1)
     assert "proof" not in client.told("pick")
     for pair, rays in (("brute", True), ("samples", None)):
-        told, got = proof(client, settings={"pair": pair})
+        told, got = proof(client, settings={"pair": pair}, **size)
         client.send(**pick, seq=2, proof=got[-1].seq)
         seen = client.told("pick")["proof"]
-        assert seen["at"] == [120, 90] and seen["of"] == [200, 150] and seen["same_rays"] is rays
+        assert seen["at"] == [60, 45] and seen["of"] == [100, 75] and seen["same_rays"] is rays
         assert [value["name"] for value in seen["values"]] == told[-1]["names"]
         for value, picture in zip(seen["values"], parts(got[-1]), strict=False):
-            assert np.array_equal(srgb(np.array(value["radiance"])), picture[90, 120]) and value["rays"] > 0
+            assert np.array_equal(srgb(np.array(value["radiance"])), picture[45, 60]) and value["rays"] > 0
     client.send(**pick, seq=3, proof=got[-1].seq - 1)  # of a view that is gone
     assert "proof" not in client.told("pick")
 
@@ -270,8 +271,9 @@ def test_a_newer_view_ends_a_proof_under_way(client: Client) -> None:
     assert [got.seq for got in client.passes(new)] == [new]
 
 
-def test_progress_of_a_proof_rises_to_one(client: Client) -> None:
-    client.view(mode="proof", w=320, h=240, settings={"pair": "samples"})
+def test_progress_of_a_proof_rises_to_one(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(session, "_PROGRESS", 0.01)
+    client.view(mode="proof", w=128, h=96, settings={"pair": "samples"})
     done, got = [], None
     while not (got and got.last):
         message = client.next()

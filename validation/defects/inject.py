@@ -20,7 +20,7 @@ from validation.defects.places import find_name
 PACKAGE = Path(__file__).resolve().parents[2] / "renderer"
 _DIGEST = "renderer.jit.digest"
 # What the package itself imports.
-_FIRST = ("renderer.jit.loaded", "renderer.lazy_names")
+_FIRST = ("renderer.collector", "renderer.jit.loaded", "renderer.lazy_names")
 
 
 def inject(change: Change) -> None:

@@ -33,6 +33,7 @@ from validation.scenes import SCENES
 from validation.thresholds import Thresholds
 
 SMALL = PictureEffort(64, paths=False)
+pytestmark = pytest.mark.usefixtures("built_once")
 
 
 @cache

@@ -127,6 +127,7 @@ def test_the_other_sign_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_ball_that_hides_itself_and_one_that_hides_nothing_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(views, "_COUNT", 200)  # every answer is changed
     with monkeypatch.context() as patch:
         changed(patch, "visible", lambda found: found & False)
         assert broken("views") == {"a ball's centre", "what is in", "what is nearer", "a point sees", "each pair of"}

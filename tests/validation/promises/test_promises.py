@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -242,6 +243,9 @@ def test_lenses_that_bend_otherwise_are_found(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_media_around_the_eye_in_another_order_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Stripes as narrow as ever, of a floor that reaches no farther than the rays.
+    monkeypatch.setattr(nesting, "_WIDTH", nesting._WIDTH / 2)
+    monkeypatch.setattr(nesting, "_STRIPES", nesting._STRIPES // 2)
     sound = pack.media_around
     for module, promise in ((pack, "an eye"), (prepare, "another camera")):
         with monkeypatch.context() as patch:
@@ -276,6 +280,8 @@ def test_counts_of_places_and_of_padding_are_found(monkeypatch: pytest.MonkeyPat
 
 def test_codes_a_step_off_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     sound = image.srgb
+    for exact in ("_start", "_reinhard", "_aces"):  # are asked with the same numbers in both cases
+        monkeypatch.setattr(codes, exact, cache(getattr(codes, exact)))
     monkeypatch.setattr(codes, "srgb", lambda linear: sound(np.asarray(linear, np.float64) * (1.0 + 1e-9)))
     assert broken("codes") == {"sRGB codes"}
     monkeypatch.setattr(codes, "srgb", lambda linear: sound(np.asarray(linear, np.float64) * (
@@ -361,6 +367,8 @@ def test_hits_that_are_lost_are_broken_promises_and_no_exceptions(
     monkeypatch.setattr(Queries, "closest_hit", losing)
     monkeypatch.setattr(planes, "_SIDE", 40)
     monkeypatch.setattr(planes, "_PIXELS", 16)
+    monkeypatch.setattr(errors, "_ALONG", 100)
+    monkeypatch.setattr(bounds, "_PLANES", 10)
     assert broken(name)
 
 
@@ -368,6 +376,7 @@ def test_hits_that_are_lost_are_broken_promises_and_no_exceptions(
 @cases("member", ["t", "t_error"])
 @cases("value", [np.nan, np.inf])
 def test_hits_at_no_number_are_broken_promises(member: str, value: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(errors, "_ALONG", 100)
     for query in ("closest_hit", "all_hits"):
         sound = getattr(Queries, query)
 
