@@ -242,22 +242,30 @@ def enter_boxes(nodes, base, slabs, lower, upper):
 def meet_boxes(nodes, base, slabs, lower, upper):
     """Entry distances (8 x float32), and the mask of the octants that the ray enters within [lower, upper]; their rows
     begin at ``base``.
+    """
+    n_x = _distances(nodes, base + slabs.near_x, slabs.near_origin_x, slabs.near_inverse_x)
+    n_y = _distances(nodes, base + slabs.near_y, slabs.near_origin_y, slabs.near_inverse_y)
+    n_z = _distances(nodes, base + slabs.near_z, slabs.near_origin_z, slabs.near_inverse_z)
+    f_x = _distances(nodes, base + slabs.far_x, slabs.far_origin_x, slabs.far_inverse_x)
+    f_y = _distances(nodes, base + slabs.far_y, slabs.far_origin_y, slabs.far_inverse_y)
+    f_z = _distances(nodes, base + slabs.far_z, slabs.far_origin_z, slabs.far_inverse_z)
+    return meet_interval(n_x, n_y, n_z, f_x, f_y, f_z, lower, upper)
+
+
+@inlined
+def meet_interval(n_x, n_y, n_z, f_x, f_y, f_z, lower, upper):
+    """Entry distances, and the mask of where a ray is in three slabs at once within [lower, upper]: from their near and
+    far planes' distances.
 
     A distance is NaN where the direction is 0 and the origin lies in a slab's plane. Each comparison is false for NaN,
     so the interval stays as it was.
     """
-    n = _distances(nodes, base + slabs.near_x, slabs.near_origin_x, slabs.near_inverse_x)
-    t0 = select(n > lower, n, lower)
-    n = _distances(nodes, base + slabs.near_y, slabs.near_origin_y, slabs.near_inverse_y)
-    t0 = select(n > t0, n, t0)
-    n = _distances(nodes, base + slabs.near_z, slabs.near_origin_z, slabs.near_inverse_z)
-    t0 = select(n > t0, n, t0)
-    f = _distances(nodes, base + slabs.far_x, slabs.far_origin_x, slabs.far_inverse_x)
-    t1 = select(f < upper, f, upper)
-    f = _distances(nodes, base + slabs.far_y, slabs.far_origin_y, slabs.far_inverse_y)
-    t1 = select(f < t1, f, t1)
-    f = _distances(nodes, base + slabs.far_z, slabs.far_origin_z, slabs.far_inverse_z)
-    t1 = select(f < t1, f, t1)
+    t0 = select(n_x > lower, n_x, lower)
+    t0 = select(n_y > t0, n_y, t0)
+    t0 = select(n_z > t0, n_z, t0)
+    t1 = select(f_x < upper, f_x, upper)
+    t1 = select(f_y < t1, f_y, t1)
+    t1 = select(f_z < t1, f_z, t1)
     return t0, t0 <= t1 * splat8(FAR_PADDING)
 
 

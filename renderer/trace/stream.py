@@ -53,6 +53,7 @@ from renderer.trace.ray_lanes import (
     shear_of,
     slabs_of,
 )
+from renderer.trace.root import enter_root, root_box
 from renderer.trace.walk import entered_in_order, first_block
 
 # The child at the bottom of each ray's stack, the code of no leaf. Its distance is that of no octant: beyond no limit,
@@ -154,8 +155,11 @@ def end_stacks(lanes, count):
 
 
 @inlined
-def begin_rays(tree, rays, prepared, lanes, queue, counts):
+def begin_rays(tree, rays, prepared, lanes, queue, counts, box):
     """Begin rays of a queue, eight at a time, while few are under way and lanes are free.
+
+    A ray that enters no octant of the root, whose box is ``box``, does not begin: it hits nothing, and has no start
+    that ``finish`` would have to examine.
 
     Returns the first ray that still waits, and the ``LaneCounts``.
     """
@@ -163,15 +167,37 @@ def begin_rays(tree, rays, prepared, lanes, queue, counts):
     while following < queue.count and nodes + counts.leaves <= MIN_ACTIVE and load(lanes.left, HALF_GROUPS) != 0:
         free = load(lanes.left, HALF_GROUPS)
         half = lowest_bit(free)
-        store(lanes.left, HALF_GROUPS, free & (free - 1))
         some, r = minimum(queue.count - following, 8), lane_of(half >> 1, 8 * (half & 1))
         numbers = offset(queue.numbers, following)
         prepare_eight(rays, prepared, r, numbers)
+        following += some
+        entering = of_none(prepared.starts, enter_root, _all_enter)(tree, box, prepared, r) & (1 << some) - 1
+        if entering == 0:
+            continue
         begin_eight(tree, rays, prepared, lanes, r, numbers, some)
-        store(lanes.left, half, some)
-        store(lanes.at_node, nodes, counting8(r, 1))
-        following, nodes = following + some, nodes + some
+        store(lanes.left, HALF_GROUPS, free & (free - 1))
+        store(lanes.left, half, count_bits(entering))
+        nodes = _list_entering(lanes, r, entering, nodes)
     return following, LaneCounts(nodes, counts.leaves, counts.ends)
+
+
+@inlined
+def _all_enter(tree, box, prepared, r):
+    """The bits of eight rays that start on the surface: most are in the root, and one may start on an edge."""
+    return np.int64(0xFF)
+
+
+@inlined
+def _list_entering(lanes, r, entering, nodes):
+    """Append those of the eight lanes from ``r`` on to the list of nodes that enter the root. Returns its length."""
+    if entering == 0xFF:
+        store(lanes.at_node, nodes, counting8(r, 1))
+        return nodes + 8
+    for k in range(8):
+        # No branch: each lane is written, and the length grows with those that enter.
+        store(lanes.at_node, nodes, r + k)
+        nodes += entering >> k & 1
+    return nodes
 
 
 @inlined
@@ -387,11 +413,11 @@ def run_lanes(tree, rays, prepared, lanes, counts, queue, most_rounds, query, an
 
     Returns the first ray that still waits, and the number of rounds.
     """
-    rounds, following = np.int64(0), queue.following
+    rounds, following, box = np.int64(0), queue.following, root_box(tree)
     while True:
         if following < queue.count and rounds <= most_rounds:
             waiting = Queue(queue.numbers, following, queue.count)
-            following, counts = begin_rays(tree, rays, prepared, lanes, waiting, counts)
+            following, counts = begin_rays(tree, rays, prepared, lanes, waiting, counts, box)
         if counts.nodes + counts.leaves + counts.ends == 0:
             return following, rounds
         rounds += 1
