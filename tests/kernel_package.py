@@ -10,7 +10,9 @@ from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1] / "renderer"
-_NEEDED = ("__init__.py*", "collector.py", "lazy*.py", "jit/*.py", "numerics/*.py", "system/__init__.py", "system/files.py")
+_NEEDED = (
+    "__init__.py*", "collector.py", "lazy*.py", "jit/*.py", "numerics/*.py", "system/__init__.py", "system/files.py"
+)  # fmt: skip
 
 # One small kernel two imports away from the constant it uses, so that each run compiles in a second.
 UPPER = """
