@@ -52,8 +52,9 @@ def _hide_scipy_from_numba() -> None:
     if "scipy" not in sys.modules:
         sys.modules["scipy"] = None  # type: ignore[assignment]  # so the import statement finds none
         # The second is imported with kernels that are loaded from disk.
-        import numba
-        import numba.np.arraymath  # noqa: F401
+        with resting():
+            import numba
+            import numba.np.arraymath  # noqa: F401
 
         del sys.modules["scipy"]
 

@@ -74,6 +74,17 @@ import scipy.linalg
     output(script)
 
 
+def test_the_collector_rests_during_an_import():
+    script = """
+import gc, renderer
+collections = []
+gc.callbacks.append(lambda phase, info: collections.append(info))
+renderer.Octree
+print(len(collections), gc.isenabled())
+"""
+    assert output(script) == "0 True\n"
+
+
 @pytest.mark.parametrize("arguments", ["", "['info', 'missing.ply']"])
 def test_only_a_command_of_its_own_process_ends_without_a_last_collection(arguments):
     """It would take a fifth of the time of a small picture; in a user's process it may close files."""

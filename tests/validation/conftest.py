@@ -1,9 +1,9 @@
 """Settings for tests that draw many pictures of the same meshes."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import pytest
+from remembered import remembered
 
 from renderer.picture import prepare
 
@@ -11,15 +11,7 @@ from renderer.picture import prepare
 @pytest.fixture(scope="module")
 def built_once() -> Iterator[None]:
     """Pictures of the same meshes share an octree, which none of them changes."""
-    built: dict[Any, Any] = {}
-
-    def once(mesh: Any, *how: Any) -> Any:
-        asked = mesh.vertices.tobytes(), mesh.faces.tobytes(), how
-        if asked not in built:
-            built[asked] = build(mesh, *how)
-        return built[asked]
-
-    build = prepare.build_octree
+    once = remembered(prepare.build_octree, lambda mesh, *how: (mesh.vertices.tobytes(), mesh.faces.tobytes(), how))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(prepare, "build_octree", once)
         yield

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from cases import cases
+from remembered import remembered
 
 from renderer.scene.scene import Scene, load_scene
 from validation.gates import Gate
@@ -66,15 +67,9 @@ GLASS = load_scene(SCENES / "glass.toml")
 @pytest.fixture(scope="module", autouse=True)
 def small() -> Iterator[None]:
     """A smaller picture and fewer pixels; the same paths are traced once, whatever our picture is."""
-    traced: dict[bytes, Any] = {}
-
-    def once(scene: Scene, rays: Any, count: int, *, max_depth: int) -> Any:
-        asked = rays[1].tobytes() + bytes([count, max_depth])
-        if asked not in traced:
-            traced[asked] = trace(scene, rays, count, max_depth=max_depth)
-        return traced[asked]
-
-    trace = mitsuba_path.random_paths
+    once = remembered(
+        mitsuba_path.random_paths, lambda scene, rays, count, *, max_depth: (rays[1].tobytes(), count, max_depth)
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(monte_carlo, "_SIZES", (64, 96))
         patch.setattr(monte_carlo, "_PIXELS", PIXELS)

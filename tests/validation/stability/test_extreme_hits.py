@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from cases import cases
+from remembered import remembered
 
 from renderer import Hits, Mesh, Octree
 from validation.oracle import exact
@@ -30,15 +31,7 @@ class Unasked:
 @pytest.fixture(scope="module", autouse=True)
 def _truth() -> Iterator[None]:
     """Exact arithmetic is asked once for rays that are judged several times; Embree is not asked."""
-    known: dict[Any, Any] = {}
-
-    def once(*rays: Any) -> Any:
-        asked = tuple((given.dtype, given.tobytes()) for given in rays)
-        if asked not in known:
-            known[asked] = exactly(*rays)
-        return known[asked]
-
-    exactly = exact.closest_hits
+    once = remembered(exact.closest_hits, lambda *rays: tuple((given.dtype, given.tobytes()) for given in rays))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(exact, "closest_hits", once)
         for module in (builds, judgement):

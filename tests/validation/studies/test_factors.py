@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from cases import cases
+from remembered import remembered
 
 from renderer.octree import Octree
 from renderer.studies import view_factors
@@ -143,16 +144,13 @@ BROKEN = {
 }
 
 
-SOUND = {}
-
-
-def found_once(octree, groups, **options):
-    """View factors, which several laws ask of the same rooms."""
+def bytes_of(octree, groups, **options):
     given = octree.mesh.vertices, octree.mesh.faces, groups, *options.values()
-    asked = (*options, *(np.asarray(array).tobytes() for array in given))
-    if asked not in SOUND:
-        SOUND[asked] = view_factors(octree, groups, **options)
-    return SOUND[asked]
+    return *options, *(np.asarray(array).tobytes() for array in given)
+
+
+# Several laws ask them of the same rooms.
+found_once = remembered(view_factors, bytes_of)
 
 
 @cases("name", BROKEN)
