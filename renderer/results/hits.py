@@ -28,7 +28,7 @@ class Passage(NamedTuple):
     side : ndarray of int64, shape (...), or None
         The side that the rays are on now; None if it is unknown.
     pile : ndarray of int64, shape (...)
-        The first of the coinciding faces that the ray came upon.
+        The first of the coinciding faces that the ray came upon, -1 for a miss.
     """
 
     face: NDArray[np.int64]

@@ -271,6 +271,23 @@ def test_a_ray_that_leads_through_the_surface_to_another_side_is_stopped_at_once
         assert hits.face == every.face[0] == top and hits.side == side
 
 
+@cases("accelerator", [Octree, BruteForce])
+def test_an_open_edge_stops_no_ray_and_sheets_in_one_plane_stop_it_at_the_lowest(accelerator):
+    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 2, 0], [-2, 2, 0], [0, -4, 0]]
+    inside, edge, corner = [0.25, 0.25, 0.0], [0.5, 0.0, 0.0], [0.0, 0.0, 0.0]
+    sheet, pile = accelerator(corners, [[0, 1, 2]]), accelerator(corners, [[3, 4, 5], [0, 1, 2], [0, 2, 1]])
+    for slope in ([0.0, 0.0], [0.1, 0.2]):
+        down, up = [*slope, -1.0], [*slope, 1.0]
+        assert sheet.any_hit([inside, edge, corner], down, leaving=0, side=1).tolist() == [True, False, False]
+        assert not sheet.any_hit([inside, edge, corner], up, leaving=0, side=1).any()
+        for face, above in ((0, 1), (1, 1), (2, -1)):
+            stopped = pile.closest_hit(inside, down, leaving=face, side=above)
+            assert (stopped.t, stopped.face) == (0.0, 0)
+            assert not pile.any_hit(inside, up, leaving=face, side=above)
+        # On the edge of a sheet the one below it still stops the ray.
+        assert pile.closest_hit(edge, down, leaving=1, side=1).face == 0
+
+
 def test_rays_go_on_from_hits_on_the_side_that_they_came_from_and_through_them_on_the_other():
     ball = icosphere(3)
     octree, rng = Octree.from_mesh(ball), np.random.default_rng(3)
@@ -283,6 +300,8 @@ def test_rays_go_on_from_hits_on_the_side_that_they_came_from_and_through_them_o
     stopped = octree.closest_hit(hits.points, directions, leaving=hits)
     np.testing.assert_array_equal(stopped.t, 0.0)
     np.testing.assert_array_equal(stopped.face, hits.face)
+    away = octree.closest_hit(hits.points, -directions, leaving=hits)
+    assert not away.hit.any() and (away.through().pile == -1).all()
     assert not octree.any_hit(hits.points, -directions, leaving=hits).any()
     beyond = octree.closest_hit(hits.points, directions, leaving=hits.through())
     np.testing.assert_array_equal(beyond.face, all_of_them.face[1::2])

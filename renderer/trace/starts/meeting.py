@@ -255,9 +255,23 @@ def meet_face(face, anchor, d, slope_there, dz):
 @kernel
 def _held(face, anchor, d, dz):
     """The ``Meeting`` with a face whose plane contains the start: the face contains it, or is missed."""
-    s0, e0 = _corner_sign(face, 1, 2)
-    s1, e1 = _corner_sign(face, 2, 0)
-    s2, e2 = _corner_sign(face, 0, 1)
+    zeros = _zeros_within(face, anchor)
+    if zeros < 0:
+        return _none()
+    e0, e1, e2 = _corner_sign(face, 1, 2)[1], _corner_sign(face, 2, 0)[1], _corner_sign(face, 0, 1)[1]
+    u, v, w = _weights(e0, e1, e2, slope_of(face, d), dz)
+    return Meeting(HOLDS, 0.0, u, v, w, zeros)
+
+
+@kernel
+def zeros_if_held(face, anchor):
+    """The bits of the corners of weight 0 of a face that contains the start, -1 for one that does not."""
+    return _zeros_within(face, anchor) if has_area(face) and _height(face, anchor) == 0 else np.int64(-1)
+
+
+@kernel
+def _zeros_within(face, anchor):
+    """``zeros_if_held`` for a face whose plane contains the start."""
     a, b, c = face.same
     # The weights of common corners are those on the anchor's face, where it shares all that are not 0 there.
     own = (np.int64(a != NONE) << (a & 3)) | (np.int64(b != NONE) << (b & 3)) | (np.int64(c != NONE) << (c & 3))
@@ -265,10 +279,11 @@ def _held(face, anchor, d, dz):
         s0 = 0 if a == NONE else 1 - ((anchor.zeros >> a) & 1)
         s1 = 0 if b == NONE else 1 - ((anchor.zeros >> b) & 1)
         s2 = 0 if c == NONE else 1 - ((anchor.zeros >> c) & 1)
+    else:
+        s0, s1, s2 = _corner_sign(face, 1, 2)[0], _corner_sign(face, 2, 0)[0], _corner_sign(face, 0, 1)[0]
     if s0 < 0 or s1 < 0 or s2 < 0 or (s0 == 0 and s1 == 0 and s2 == 0):
-        return _none()
-    u, v, w = _weights(e0, e1, e2, slope_of(face, d), dz)
-    return Meeting(HOLDS, 0.0, u, v, w, _zeros(s0, s1, s2))
+        return np.int64(-1)
+    return _zeros(s0, s1, s2)
 
 
 @inlined

@@ -26,6 +26,7 @@ from renderer.trace.starts.cone import (
     PATH,
     SECOND_NODE,
     UNKNOWN,
+    ZEROS,
     cone_of,
     crosses,
     holder,
@@ -189,6 +190,35 @@ class Behind(NamedTuple):
     pile: int
     has_back: bool
     back: Any
+
+
+@kernel
+def are_one_plane(tree, anchor, holders, count, face, d, slope):
+    """Whether a start is inside all faces that contain it, ``face`` among them, and all lie in one plane and see the
+    direction d on one side of it; ``slope`` is that of ``face``. Then the ray is stopped, by the lowest of them, where
+    it leads to the side on which it does not start.
+    """
+    own = holder_of(holders, count, face)
+    if own == NOT_STOPPED or holder(holders, own, ZEROS) != 0:
+        return False
+    if count == 1:
+        return True
+    cone, same = cone_of(tree, anchor, holders, own), True
+    for k in range(count):
+        same = same and (k == own or _is_same_plane(tree, anchor, holders, k, cone, d, slope))
+    return same
+
+
+@kernel
+def _is_same_plane(tree, anchor, holders, k, cone, d, slope):
+    """Whether the k-th face has the start inside it, lies in the plane of a cone, and sees d on the same side of it."""
+    if holder(holders, k, ZEROS) != 0:
+        return False
+    face = cone_of(tree, anchor, holders, k).face
+    if lean_sign(face, cone.first) != 0 or lean_sign(face, cone.second) != 0:
+        return False
+    turned = dot_pairs(face.normal, cone.face.normal)[0] < 0.0
+    return slope_of(face, d) == (-slope if turned else slope)
 
 
 @kernel

@@ -11,7 +11,7 @@ import numpy as np
 from renderer.jit.decorators import apart, inlined, kernel
 from renderer.numerics.double_double import as_pairs, cross_pairs, dot_pairs, power_below, quotient, scaled_difference
 from renderer.numerics.simd import local_doubles, lowest_bit, maximum, minimum, pointer, store
-from renderer.numerics.vec3 import add, largest_component, sub
+from renderer.numerics.vec3 import add, cross, dot, largest_component, largest_of_three, sub
 from renderer.trace.best import NO_FACE, Best, FaceHit, hit_on, is_better, no_hit
 from renderer.trace.edge_signs import corners_at
 from renderer.trace.intersect import (
@@ -32,7 +32,6 @@ from renderer.trace.starts.arcs import arcs_of
 from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, cone_of, holder, make_holders
 from renderer.trace.starts.fan import clear_fan, write_fan
 from renderer.trace.starts.meeting import (
-    HOLDS,
     IS_HIT,
     barycentrics_of,
     meet_face,
@@ -40,6 +39,7 @@ from renderer.trace.starts.meeting import (
     slope_of,
     slope_there,
     unit_direction,
+    zeros_if_held,
 )
 from renderer.trace.starts.record import (
     ABOVE,
@@ -57,12 +57,21 @@ from renderer.trace.starts.record import (
     start_at,
     way_back,
 )
-from renderer.trace.starts.region import NOT_STOPPED, Behind, bounding_holder, holder_of, stopping_holder
+from renderer.trace.starts.region import (
+    NOT_STOPPED,
+    Behind,
+    are_one_plane,
+    bounding_holder,
+    holder_of,
+    stopping_holder,
+)
 from renderer.trace.trees import tree_pointers
 from renderer.trace.walk import always, walk, walk_nearest_first
 
 # The boxes of the faces that hold a start hold it as rounded, with so much room of its coordinates.
 _ROOM = 2.0**-50
+# The share of lengths by which products of four differences in float64 err.
+_ROUNDED = 2.0**-44
 # The t of a hit on the next face of a pile, which differs from others at t = 0 by its sign.
 AHEAD = -0.0
 # The least t of a face that does not hold the start: what is less would be 0 in the mesh's own units.
@@ -72,43 +81,52 @@ _NEAR_HIT = 2.0**20
 
 
 @inlined
-def _box_holds(tree, place, o):
-    """Whether the box of a face, widened by _ROOM, contains a point."""
+def _box_holds(tree, place, o, room):
+    """Whether the box of a face, widened by ``room``, contains a point."""
     p0, p1, p2 = corners_at(tree, place)
-    holds, room = True, largest_component(o) * _ROOM
+    holds = True
     for k in range(3):
         low, high = minimum(p0[k], minimum(p1[k], p2[k])), maximum(p0[k], maximum(p1[k], p2[k]))
         holds = holds and low - room <= o[k] and o[k] <= high + room
     return holds
 
 
+@inlined
+def _is_beside(tree, place, o, room):
+    """Whether a point is surely beside a face, seen along its normal, wherever it is within ``room`` of o."""
+    p0, p1, p2 = corners_at(tree, place)
+    one, other, a, b, c = sub(p1, p0), sub(p2, p0), sub(p0, o), sub(p1, o), sub(p2, o)
+    n = cross(one, other)
+    side = largest_component(one) + largest_component(other)
+    reach = largest_of_three(a, b, c) + room
+    # An edge function errs by some 100 u of all these lengths, and by what moves the point.
+    error = side * side * reach * (reach * _ROUNDED + 12.0 * room)
+    e0, e1, e2 = dot(n, cross(b, c)), dot(n, cross(c, a)), dot(n, cross(a, b))
+    return minimum(e0, minimum(e1, e2)) < -error
+
+
 class _Surroundings(NamedTuple):
-    """The search for faces around a start: the anchor, also as rounded; the box around it; for a ray that leaves it the
-    direction and the last two arguments of ``meet_face``; the list of faces that contain the anchor; and mask and
-    instance ignored, as of ``intersect.Ray``.
+    """The search for faces around a start: the anchor, also as rounded; the room around that, and the box of both; the
+    list of faces that contain the anchor; and mask and instance ignored, as of ``intersect.Ray``.
     """
 
     anchor: Any
     o: Any
+    room: float
     low: Any
     high: Any
-    d: Any
-    slope: int
-    dz: float
     holders: Any
     mask: float
     ignored: float
 
 
 @kernel
-def list_holders(tree, anchor, d, slope, dz, stack, holders, mask, ignored):
-    """List the faces that contain an anchor from which a ray leaves in direction d, and that it may hit. Returns their
-    number.
-    """
+def list_holders(tree, anchor, stack, holders, mask, ignored):
+    """List the faces that contain an anchor and that a ray from there may hit. Returns their number."""
     o = rounded(anchor)
     room = largest_component(o) * _ROOM
     low, high = sub(o, (room, room, room)), add(o, (room, room, room))
-    query = _Surroundings(anchor, o, low, high, d, slope, dz, holders, mask, ignored)
+    query = _Surroundings(anchor, o, room, low, high, holders, mask, ignored)
     return walk(tree, stack, query, np.int64(0), _enter_around, _add_holders)
 
 
@@ -126,22 +144,34 @@ def _add_holders(tree, query, first, blocks, count):
     for block in range(first, first + blocks):
         for i in range(BLOCK_FACES):
             face, place = face_in(tree, block * BLOCK_FACES + i), block * BLOCK_WORDS + i
-            if face >= 0 and _box_holds(tree, place, query.o):
-                met = meet_face(seen_from(tree, place, query.anchor), query.anchor, query.d, query.slope, query.dz)
-                if met.kind == HOLDS:
-                    count = add_holder(query.holders, count, place, face, met.zeros)
+            if (
+                face >= 0
+                and _box_holds(tree, place, query.o, query.room)
+                and not _is_beside(tree, place, query.o, query.room)
+            ):
+                zeros = zeros_if_held(seen_from(tree, place, query.anchor), query.anchor)
+                if zeros >= 0:
+                    count = add_holder(query.holders, count, place, face, zeros)
     return count, False
 
 
 @kernel
 def _stopped(tree, behind, anchor, count, d, slope, dz, holders):
     """The ``Best`` hit that stops a ray at its start, which ``count`` faces contain."""
+    if slope != 0 and not behind.through and are_one_plane(tree, anchor, holders, count, behind.face, d, slope):
+        return _stop_at(tree, holders, 0, anchor, d, slope, dz, 0.0) if slope == -behind.side else no_hit(np.inf)
     arcs, number, nodes = arcs_of(tree, anchor, holders, count)
     k, ahead = stopping_holder(tree, anchor, arcs, number, nodes, behind, d)
     if k == NOT_STOPPED:
         return no_hit(np.inf)
+    return _stop_at(tree, arcs, k, anchor, d, slope, dz, AHEAD if ahead else 0.0)
+
+
+@kernel
+def _stop_at(tree, arcs, k, anchor, d, slope, dz, t):
+    """The ``Best`` hit of the k-th of the faces that contain a start."""
     met = meet_face(seen_from(tree, holder(arcs, k, PLACE), anchor), anchor, d, slope, dz)
-    return Best(AHEAD if ahead else 0.0, np.int32(holder(arcs, k, NUMBER)), met.u, met.v, met.w)
+    return Best(t, np.int32(holder(arcs, k, NUMBER)), met.u, met.v, met.w)
 
 
 class Departure(NamedTuple):
@@ -177,7 +207,7 @@ def depart(tree, starts, i, ray, stack, memory):
     stopped, slope, count = no_hit(np.inf), slope_there(anchor, d), 0
     if start.code & KNOWN != 0 and ray.t_min == 0.0:
         dz, holders = make_shear(ray).direction_z, make_holders(memory)
-        count = list_holders(tree, anchor, d, slope, dz, stack, holders, ray.mask, ray.ignored)
+        count = list_holders(tree, anchor, stack, holders, ray.mask, ray.ignored)
         # rule: side-of-start
         behind = Behind(
             start.face, 1 if start.code & ABOVE != 0 else -1, start.code & THROUGH != 0, np.int64(start.anchor[2]),
@@ -303,7 +333,7 @@ def take_side(tree, starts, n, stack, memory, table, room):
     start, holders = start_at(tree, starts, 0), make_holders(memory)
     anchor, (d, _) = anchor_of(start), unit_direction(n)
     slope = slope_there(anchor, d)
-    count = list_holders(tree, anchor, d, slope, 1.0, stack, holders, ALL, -1.0)
+    count = list_holders(tree, anchor, stack, holders, ALL, -1.0)
     arcs, number, nodes = arcs_of(tree, anchor, holders, count)
     k, side = bounding_holder(tree, anchor, arcs, number, nodes, d, start.face)
     clear_fan(table)
