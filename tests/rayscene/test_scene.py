@@ -253,6 +253,16 @@ def test_rays_hit_the_sides_of_faces_that_they_are_asked_to(repeats):
     assert (scene.count_hits(origins, [0, 0, -1], faces="back") == 1).all()
 
 
+@cases("repeats", [1, 20])
+def test_of_two_faces_in_one_place_each_is_hit_on_its_own_side(repeats):
+    """The first may be one that the ray is not to hit."""
+    for faces in ([[0, 1, 2], [0, 2, 1]], [[0, 2, 1], [0, 1, 2]]):
+        scene = RayScene()
+        scene.add(Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], faces))
+        for side in ("front", "back", "both"):
+            assert scene.any_hit([[0.2, 0.3, 1.0]] * repeats, [0, 0, -1], faces=side).all(), (faces, side)
+
+
 def test_a_mesh_that_stands_alone_has_the_hits_of_its_octree():
     octree, scene, rng = Octree(icosphere(3)), RayScene(), np.random.default_rng(5)
     scene.add(octree)
@@ -609,6 +619,15 @@ def test_what_a_ray_does_not_see_is_not_there_where_it_starts(repeats):
     below = scene.closest_hit(roof.points, down, leaving=roof, ignore=roof)
     assert (below.object == plate).all() and (below.t == 1).all()
     assert (scene.closest_hit(roof.points, down, leaving=roof).t == 0).all()
+
+    # A roof in the plane of the plate: without the cube the ray starts on the plate.
+    scene = RayScene()
+    plate, cube = scene.add(box((-9, -9, -1), (9, 9, 0)), mask=1), scene.add(box((-1, -1, -1), (1, 1, 0)), mask=2)
+    roof = scene.closest_hit(np.repeat([[0.3, 0.4, 9.0]], repeats, axis=0), down, mask=2)
+    assert (roof.object == cube).all()
+    for aim in (down, -down):
+        at_once = scene.closest_hit(roof.points, aim, leaving=roof, ignore=roof)
+        assert (at_once.object == plate).all() and (at_once.t == 0).all()
 
 
 def test_hits_of_a_copy_are_those_of_the_scene_until_one_of_them_changes():

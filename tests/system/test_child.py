@@ -57,17 +57,24 @@ def test_what_is_given_for_a_child_is_before_what_this_process_has(monkeypatch):
     assert child.environment(OCTREE_RENDERER_QUIET="1")["OCTREE_RENDERER_QUIET"] == "1"
 
 
-def test_a_child_that_fails_is_said_with_its_last_words(monkeypatch, caplog):
+@pytest.mark.parametrize(
+    "ending, said",
+    [
+        ("raise OSError('no room')", "exit code 1: OSError: no room"),
+        ("os.kill(os.getpid(), 9)", "exit code -9: it began"),
+    ],
+)
+def test_a_child_that_fails_is_said_with_its_last_words(monkeypatch, caplog, ending, said):
     monkeypatch.setattr(precompile, "is_on_disk", lambda kernel: False)
     monkeypatch.setattr(precompile, "available_threads", lambda: 2)
     monkeypatch.setattr(precompile, "_build", lambda: None)
-    command = [sys.executable, "-P", "-c", "import sys; print('it began', file=sys.stderr); raise OSError('no room')"]
+    script = f"import os, sys; print('it began', file=sys.stderr, flush=True); {ending}"
+    command = [sys.executable, "-P", "-c", script]
     monkeypatch.setattr(child, "command", lambda *arguments: command)
     precompile.compile_in_two()
     (record,) = caplog.records
     assert record.levelname == "WARNING"
-    told = "renderer: the process that compiles beside this one ended with exit code 1: OSError: no room"
-    assert record.getMessage() == told
+    assert record.getMessage() == f"renderer: the process that compiles beside this one ended with {said}"
 
 
 @pytest.mark.parametrize("folder", [None, "kernels"])
