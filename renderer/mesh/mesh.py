@@ -175,6 +175,10 @@ class Mesh:
         given = (self.vertices, self.faces, self.normals, self.colors, self.texcoords, self.name)
         return Mesh, (*given, self.materials, self.face_materials, self._parts)
 
+    def __repr__(self) -> str:
+        name = f" {self.name!r}" if self.name else ""
+        return f"<Mesh{name} of {len(self.faces):,} faces, {len(self.vertices):,} vertices>"
+
     @classmethod
     def _viewing(cls, arrays: Mapping[str, NDArray[Any]], name: str) -> Mesh:
         """A mesh over ``arrays`` themselves, which have its names, types and shapes: they are not copied.

@@ -167,6 +167,10 @@ class Image:
     render_seconds: float
     cut: int = 0
 
+    def __repr__(self) -> str:
+        height, width = self.radiance.shape[:2]
+        return f"<Image of {width} x {height} pixels>"
+
     def cut_message(self, max_rays: int) -> str:
         """The message of ``CutWarning`` for this picture.
 

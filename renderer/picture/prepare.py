@@ -93,6 +93,9 @@ class PreparedScene:
         """
         return self.built.merged if isinstance(self.built, BuiltScene) else self.built
 
+    def __repr__(self) -> str:
+        return f"<PreparedScene of {sum(part.faces for part in self.scene.instances):,} faces>"
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles make the kernels' arrays anew, so that they are of the types that kernels know."""
         return _restored, (self.scene, self.built, self.needs, self.build_seconds)

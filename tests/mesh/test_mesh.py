@@ -115,6 +115,11 @@ def test_may_be_empty() -> None:
     assert Mesh([[1, 2, 3]], []).vertex_normals().tolist() == [[0, 0, 0]]
 
 
+def test_prints_on_one_line() -> None:
+    assert repr(Mesh(**TRIANGLE, name="pot")) == "<Mesh 'pot' of 1 faces, 3 vertices>"
+    assert repr(Mesh([], [])) == "<Mesh of 0 faces, 0 vertices>"
+
+
 def test_is_float32() -> None:
     assert Mesh([[0.5, 1e-45 * 0, 2.0**-140]], []).is_float32
     assert not Mesh([[0.1, 0, 0]], []).is_float32

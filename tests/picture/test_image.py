@@ -72,6 +72,10 @@ def test_each_row_of_a_png_is_written_and_looked_at(height: int) -> None:
             image(spoilt)._repr_png_()
 
 
+def test_a_picture_prints_as_its_size() -> None:
+    assert repr(image()) == "<Image of 7 x 5 pixels>"
+
+
 def test_png_is_read_by_mitsuba(tmp_path: Path, mitsuba: Any) -> None:
     """Another reader than the package that wrote it."""
     picture = image()

@@ -133,6 +133,10 @@ print(resident() - before)
     assert int(told.stdout) < 335e6 / 10
 
 
+def test_a_prepared_scene_prints_on_one_line():
+    assert repr(prepared("stairs")) == "<PreparedScene of 46 faces>"
+
+
 def test_the_tree_is_built_once(monkeypatch):
     built = []
     monkeypatch.setattr(Octree, "_build", lambda *a, sound=Octree._build: (built.append(1), sound(*a)))
