@@ -9,8 +9,9 @@ from typing import Annotated, Any, Concatenate, ParamSpec
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic_core import PydanticCustomError
 
-from renderer.errors import SceneError
+from renderer.errors import SceneError, expect_known
 from renderer.lazy import lazy
 
 _Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
@@ -21,13 +22,21 @@ FiniteVector = tuple[_Number, _Number, _Number]
 Keys = tuple[int | str, ...]
 
 
-def thrice(value: object) -> object:
-    """Let one number stand for three that are equal: red, green and blue, or x, y and z."""
-    return (value, value, value) if isinstance(value, int | float) and not isinstance(value, bool) else value
+def one_for(count: int) -> BeforeValidator:
+    """Let one number stand for ``count`` that are equal: red, green and blue, or width and height."""
+
+    def spread(value: object) -> object:
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            return (value,) * count
+        if isinstance(value, str | bytes | dict) or not isinstance(value, Iterable):
+            raise ValueError(f"expected a number or a list of {count}, got {_value(value)}")
+        return value
+
+    return BeforeValidator(spread)
 
 
 _Channel = Annotated[float, Field(ge=0.0, allow_inf_nan=False, strict=True)]
-Color = Annotated[tuple[_Channel, _Channel, _Channel], BeforeValidator(thrice)]
+Color = Annotated[tuple[_Channel, _Channel, _Channel], one_for(3)]
 
 
 class SceneWarning(UserWarning):
@@ -72,8 +81,13 @@ class Fields(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _plain(cls, values: Any) -> Any:
-        """NumPy's numbers and arrays as Python's own, which the fields' types know."""
-        return {key: _unpacked(value) for key, value in values.items()} if isinstance(values, dict) else values
+        """NumPy's numbers and arrays as Python's own, which the fields' types know. Unknown keys are refused."""
+        if not isinstance(values, dict):
+            return values
+        for key in values:
+            if key not in cls.model_fields:
+                raise _unknown(key, values[key], cls.model_fields)
+        return {key: _unpacked(value) for key, value in values.items()}
 
     # Without it pydantic would call __init__ for each record within another, and lose the place of a fault.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
@@ -120,16 +134,31 @@ def _unpacked(value: object) -> object:
     return tuple(_unpacked(entry) for entry in value) if type(value) is tuple else value
 
 
+def _unknown(key: object, value: object, known: Iterable[str]) -> PydanticCustomError:
+    """The fault of a key that is none of ``known``."""
+    try:
+        expect_known(f"unknown key (its value is {shown(value)})", key, known)
+    except ValueError as error:
+        text = str(error)
+    # The place of the fault is that of the table; ``first_fault`` adds the key.
+    return PydanticCustomError("unknown_key", "{text}", {"text": text, "key": key})
+
+
+# The most places of further faults that a line names.
+_PLACES = 3
+
+
 def first_fault(error: ValidationError, member: Callable[[Keys], int | None] = lambda keys: None) -> str:
-    """One line for the first fault, with the number of others.
+    """One line for the first fault, with the number and the first places of others.
 
     For a union pydantic puts the name of a member among the keys, which no file has; ``member`` gives its place.
     """
     # Unknown keys first: one is likely a misspelling of a missing one.
-    faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
+    faults = sorted(error.errors(), key=lambda fault: fault["type"] != "unknown_key")
     first = faults[0]
-    keys = first["loc"]
-    where = ".".join(shown(k) for i, k in enumerate(keys) if i != member(keys))
+    where, *others = (_place(fault, member) for fault in faults)
+    places = f"{', '.join(others[:_PLACES])}{', ...' if len(others) > _PLACES else ''}"
+    more = f" (and {len(others)} more, at {places})" if others else ""
     # It may quote the given value with its line breaks.
     message = _in_our_words(" ".join(first["msg"].split()))
     says_it = (first["type"] == "value_error" and ", got" in message) or isinstance(first["input"], dict)
@@ -138,10 +167,14 @@ def first_fault(error: ValidationError, member: Callable[[Keys], int | None] = l
         message, got = _type_message(first["ctx"]), ""
     if first["type"] == "missing" and isinstance(first["input"], dict):
         got = ", got none"
-    if first["type"] == "extra_forbidden":
-        message, got = "unknown key", f" (its value is {shown(first['input'])})"
-    others = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
-    return f"{where}: {message}{got}{others}" if where else f"{message}{got}{others}"
+    return f"{where}: {message}{got}{more}" if where else f"{message}{got}{more}"
+
+
+def _place(fault: Any, member: Callable[[Keys], int | None]) -> str:
+    """The keys that lead to a fault."""
+    keys = fault["loc"]
+    own = [fault["ctx"]["key"]] if fault["type"] == "unknown_key" else []
+    return ".".join(shown(k) for k in [*(k for i, k in enumerate(keys) if i != member(keys)), *own])
 
 
 # Pydantic's words, and those of every other error of this package.

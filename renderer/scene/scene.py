@@ -24,9 +24,9 @@ from renderer.arguments.fields import (
     Keys,
     SceneWarning,
     first_fault,
+    one_for,
     shown,
     stated,
-    thrice,
 )
 from renderer.arguments.types import ArrayLike
 from renderer.arguments.up import UP_AXES, up_axis
@@ -73,11 +73,6 @@ def _path_or_mesh(value: Any) -> Any:
 
 # The most that a count can hold, for ``max_rays``.
 UNLIMITED_RAYS = 2**62 - 1
-
-
-def _twice(value: Any) -> Any:
-    """Let one number stand for width and height."""
-    return (value, value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
 class RenderSettings(Fields):
@@ -138,7 +133,7 @@ class RenderSettings(Fields):
     6
     """
 
-    resolution: Annotated[tuple[_Pixels, _Pixels], BeforeValidator(_twice)] = (512, 512)
+    resolution: Annotated[tuple[_Pixels, _Pixels], one_for(2)] = (512, 512)
     samples: Annotated[int, Field(le=65536, strict=True)] = 1
     filter: FilterName = "box"
     max_depth: Annotated[int, Field(ge=0, le=64, strict=True)] = 6
@@ -248,7 +243,7 @@ class SceneObject(Fields):
     material: str | None = None
     normals: Literal["flat", "smooth"] = "flat"
     crease: Annotated[float, Field(ge=0.0, le=180.0, strict=True)] = 180.0
-    scale: Annotated[FiniteVector, BeforeValidator(thrice)] = (1.0, 1.0, 1.0)
+    scale: Annotated[FiniteVector, one_for(3)] = (1.0, 1.0, 1.0)
     rotate: FiniteVector = (0.0, 0.0, 0.0)
     translate: FiniteVector = (0.0, 0.0, 0.0)
 

@@ -106,7 +106,11 @@ def test_the_skys_lights_come_after_the_scenes_own() -> None:
         ({"background": 0.5, "sky": {}}, "Scene: background: expected none beside a sky, got (0.5, 0.5, 0.5)"),
         ({"sky": {"lights": 5000}}, "Scene: sky.lights: expected a number less than or equal to 4096, got 5000"),
         ({"sky": {"sun": (0, 0, 0)}}, "Scene: sky.sun: expected a direction of non-zero length, got (0, 0, 0)"),
-        ({"sky": {"colour": 1}}, "Scene: sky.colour: unknown key (its value is 1)"),
+        (
+            {"sky": {"colour": 1}},
+            "Scene: sky.colour: unknown key (its value is 1): expected one of zenith, horizon, ground, lights, sun, "
+            "sun_irradiance, sun_angle, sun_lights, got 'colour'",
+        ),
     ],
 )
 def test_what_is_no_sky_is_said(changes: dict[str, Any], says: str) -> None:
