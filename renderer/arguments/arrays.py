@@ -25,6 +25,8 @@ def real_array(values: Any) -> NDArray[Any]:
     array = plain_array(values)
     if array.dtype.kind == "O" and array.ndim and all(_is_number(x) for x in array.flat):
         array = array.astype(np.float64)
+    if array.dtype.kind == "O" and any(isinstance(x, int) and abs(x) > _LARGEST_WHOLE for x in array.flat):
+        raise ValueError("expected numbers that float64 holds, got an integer beyond 2^53")
     if array.dtype.kind not in "fiu":
         raise ValueError(f"expected real numbers, got dtype {array.dtype}")
     if array.dtype.kind in "iu" and array.dtype.itemsize == 8 and array.size:

@@ -76,14 +76,15 @@ def parse_ply(content: bytes, reading: Reading | None = None) -> Mesh:
     order. Vertex normals, colours (red, green, blue; integers are
     divided by 255 or by their type's maximum) and texture coordinates (s t, u v or texture_u texture_v) are
     kept; a comment ``TextureFile`` gives a material. Other properties and elements are left out and noted, as are faces
-    of fewer than three corners, header lines of no meaning and bytes behind the last element.
+    of fewer than three corners, header lines of no meaning and bytes behind the last element. An alpha that is opaque
+    at all vertices is not noted.
 
     Raises ``MeshError``, which does not know the file's name.
     """
     reading = reading or Reading()
     columns, elements = _vertices(content, reading)
-    _note_left_out(elements, reading)
     vertex = columns["vertex"]
+    _note_left_out(elements, vertex, reading)
     positions = _vertex_columns(vertex, _XYZ)
     if positions is None:
         raise MeshError(f"element vertex: expected properties x, y and z, got {', '.join(vertex) or 'none'}")
@@ -126,9 +127,12 @@ def _vertices(content: bytes, reading: Reading) -> tuple[dict[str, _Columns], li
     return columns, elements
 
 
-def _note_left_out(elements: list[_Element], reading: Reading) -> None:
-    """Note elements and properties that have no place in a mesh."""
-    places = {"vertex": _KEPT, "face": set(_INDEX_NAMES), "tristrips": set(_INDEX_NAMES)}
+def _note_left_out(elements: list[_Element], vertex: _Columns, reading: Reading) -> None:
+    """Note elements and properties that have no place in a mesh. An alpha that is opaque everywhere needs none."""
+    alpha = _vertex_columns(vertex, ("alpha",))
+    opaque = alpha is not None and bool((alpha == _full(vertex["alpha"].property.type, alpha)).all())
+    own = _KEPT | {"alpha"} if opaque else _KEPT
+    places = {"vertex": own, "face": set(_INDEX_NAMES), "tristrips": set(_INDEX_NAMES)}
     for element in elements:
         names = [p.name for p in element.properties if p.name not in places.get(element.name, ())]
         if element.name not in places and element.count:

@@ -70,7 +70,8 @@ def _on_faces(scene: BuiltScene, leaving: Leaving) -> Hits | Passage | None:
         return None
     known = isinstance(leaving, SceneHits | ScenePassage)
     expect(known, "leaving", "hits of a scene", type(leaving).__name__)
-    expect(leaving.moment == scene.moment, "leaving", "hits on the scene as it is", "hits from before it changed")
+    now = leaving.moment == scene.moment
+    expect(now, "leaving", "hits on the scene as it is", "hits of another scene, or from before this one changed")
     return leaving.passage if isinstance(leaving, ScenePassage) else leaving._found
 
 

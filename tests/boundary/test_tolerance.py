@@ -68,6 +68,11 @@ class TestRays:
             with pytest.raises(ValueError, match=r"^origins: expected real numbers, got dtype object"):
                 BALL.closest_hit(broken, MANY)
 
+    def test_an_integer_beyond_float64_is_named_as_the_reason(self) -> None:
+        for name, bad in (("origins", [[0, 0, 10**400]]), ("t_max", 10**400)):
+            with pytest.raises(ValueError, match=rf"^{name}: expected numbers that float64 holds, got an integer"):
+                BALL.closest_hit(**{"origins": MANY[:1], "directions": MANY[:1], name: bad})
+
 
 class TestScenes:
     def test_numbers_of_numpy_are_numbers(self) -> None:

@@ -52,6 +52,14 @@ PLY = {
     "rows behind": (PLAIN + "1 2 3\n", "left out: what stands behind the last element"),
     "64 bits": (PLAIN.replace("float x", "int64 x").replace("int vertex", "uint64 vertex"), None),
     "colours of any number": (f"{HEAD}{RED}{LIST}end_header\n{COLOURED}{LISTS}", None),
+    "an alpha of opaque colours": (
+        f"{HEAD}{RED}property uchar alpha\n{LIST}end_header\n" + COLOURED.replace("\n", " 255\n") + LISTS, None,
+    ),
+    "an alpha of which one is not opaque": (
+        f"{HEAD}{RED}property uchar alpha\n{LIST}end_header\n"
+        + COLOURED.replace("\n", " 255\n").replace("255 255", "255 254", 1) + LISTS,
+        "left out of element vertex: alpha",
+    ),
     "colours that fit nothing": (
         f"{HEAD}{RED}{LIST}end_header\n{COLOURED.replace('255', '256')}{LISTS}",
         "left out: vertex colours that do not fit their type or 0 to 255",

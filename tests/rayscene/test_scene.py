@@ -534,6 +534,7 @@ FAULTS = {
     "ignore: expected hits of a scene": lambda s: s.closest_hit(HERE, DOWN, ignore=3),
     "leaving: expected hits on the scene as it is": lambda s: s.any_hit(HERE, DOWN, leaving=before_a_move(s)),
     "leaving: expected hits on the scene as it": lambda s: s.any_hit(HERE, DOWN, leaving=before_a_move(s).through()),
+    "leaving: .* another scene": lambda s: s.any_hit(HERE, DOWN, leaving=another().closest_hit(HERE, DOWN)),
     "faces: expected one of": lambda s: s.any_hit(HERE, DOWN, faces="inside"),
     "faces: expected 'both' with leaving": lambda s: s.any_hit(
         HERE, DOWN, leaving=s.closest_hit(HERE, DOWN), faces="front"
