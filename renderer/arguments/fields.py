@@ -50,7 +50,7 @@ class SceneWarning(UserWarning):
     ...     warnings.simplefilter("always")
     ...     red = Phong(diffuse=(255, 0, 0))
     >>> print(caught[0].message)
-    Phong: diffuse: expected numbers from 0 to 1, got (255.0, 0.0, 0.0). Divide 8-bit colours by 255.
+    Phong: diffuse: expected numbers from 0 to 1, got (255.0, 0.0, 0.0), used as given. Divide 8-bit colours by 255.
     """
 
 

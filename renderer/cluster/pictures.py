@@ -21,7 +21,7 @@ from renderer.picture.prepare import MediaRule
 from renderer.picture.render import check_tree, checked_view
 from renderer.scene.camera import Camera
 from renderer.scene.needs import needs_of
-from renderer.scene.scene import Scene
+from renderer.scene.scene import Scene, kind_of
 from renderer.system.files import are_apart, as_path, write_atomically
 from renderer.system.terminal import progress_bar
 
@@ -178,7 +178,7 @@ class _Sender:
 
     def picture(self, scene: Scene, camera: Camera | None = None) -> tuple[SentScene, Picture]:
         """The scene as it is sent, the one before where it differs in the camera alone, and the picture of it."""
-        expect(isinstance(scene, Scene), "scene", "a Scene", type(scene).__name__)
+        expect(isinstance(scene, Scene), "scene", "a Scene", kind_of(scene))
         view = checked_view(scene, camera, self._offset, self._planes, self._settings, self._media)
         needs = needs_of(scene, view.chosen.max_depth)
         latest = self._latest

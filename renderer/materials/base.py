@@ -69,7 +69,7 @@ class BaseMaterial(Fields):
         for name in ("diffuse", "specular", "reflectance", "transmittance"):
             color = getattr(self, name, BLACK)
             if max(color) > 1.0:
-                yield f"{name}: expected numbers from 0 to 1, got {color}. Divide 8-bit colours by 255."
+                yield f"{name}: expected numbers from 0 to 1, got {color}, used as given. Divide 8-bit colours by 255."
 
 
 def appearance_of(material: BaseMaterial) -> Appearance:

@@ -14,7 +14,7 @@ from renderer.picture.prepare import MediaRule, PreparedScene, prepare_scene, ti
 from renderer.scene.camera import Camera
 from renderer.scene.cameras.base import BaseCamera
 from renderer.scene.needs import Features, checked_needs
-from renderer.scene.scene import GivenSettings, RenderSettings, Scene, checked_settings
+from renderer.scene.scene import GivenSettings, RenderSettings, Scene, checked_settings, kind_of
 from renderer.system.terminal import progress_bar
 from renderer.system.threads import checked_threads
 from renderer.trace.spawn import BOUNDED, MITSUBA_EPSILON, OffsetRule
@@ -105,7 +105,7 @@ def render(
     [[0, -1]]
     """
     threads = checked_threads(threads)
-    expect(isinstance(scene, Scene | PreparedScene), "scene", "a Scene or a PreparedScene", type(scene).__name__)
+    expect(isinstance(scene, Scene | PreparedScene), "scene", "a Scene or a PreparedScene", kind_of(scene))
     source = scene.scene if isinstance(scene, PreparedScene) else scene
     view = checked_view(source, camera, offset, planes, settings, media)
     columns, rows = _window(window, *view.chosen.resolution)
@@ -161,7 +161,7 @@ def prepare(
     >>> [int(render(ready, camera=eye, resolution=1).face[0, 0]) for eye in (camera, beside)]
     [0, -1]
     """
-    expect(isinstance(scene, Scene), "scene", "a Scene", type(scene).__name__)
+    expect(isinstance(scene, Scene), "scene", "a Scene", kind_of(scene))
     # The needs are the same for any number of bounces above 0.
     depth = max(1, scene.render.max_depth)
     return _prepared(scene, depth, accelerator, split, needs, checked_threads(threads))

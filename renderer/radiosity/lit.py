@@ -22,7 +22,7 @@ from renderer.radiosity.looks import Look, check_reflectance, left_out, lit_mate
 from renderer.radiosity.patch import patches
 from renderer.radiosity.solve import radiosity
 from renderer.scene.instance import Instance
-from renderer.scene.scene import Scene, SceneObject
+from renderer.scene.scene import Scene, SceneObject, kind_of
 from renderer.studies.factors.compute import view_factors
 from renderer.studies.factors.result import ViewFactors
 from renderer.studies.factors.surfaces import areas_of
@@ -114,7 +114,7 @@ def lit_scene(
     >>> render(lit_scene(scene, 0.5), resolution=2).radiance.round(3)[0].tolist()
     [[1.0, 1.0, 1.0], [1.0, 1.0, 1.0]]
     """
-    expect(isinstance(scene, Scene), "scene", "a renderer.Scene", type(scene).__name__)
+    expect(isinstance(scene, Scene), "scene", "a renderer.Scene", kind_of(scene))
     angle = real_argument("crease", crease)
     expect(angle.ndim == 0 and 0.0 <= float(angle) <= 180.0, "crease", "an angle from 0 to 180 degrees", repr(crease))
     check_reflectance(scene)

@@ -17,7 +17,7 @@ from renderer.materials.base import appearance_of
 from renderer.materials.columns import CLEAR
 from renderer.scene.instance import Instance
 from renderer.scene.light import light_row
-from renderer.scene.scene import Scene
+from renderer.scene.scene import Scene, kind_of
 
 # The most faces for which no tree is built. Whole frames of boxes and spheres on a floor, one thread: to test all
 # blocks took 0.72 of the time with a tree for 2 faces, 0.88 for 14, 0.89 for 22, 0.96 for 26, 1.06 to 1.10 for 38, 1.28
@@ -137,7 +137,7 @@ def needs_of(scene: Scene, max_depth: int | None = None) -> Features:
     >>> needs_of(empty).shadows
     False
     """
-    expect(isinstance(scene, Scene), "scene", "a Scene", type(scene).__name__)
+    expect(isinstance(scene, Scene), "scene", "a Scene", kind_of(scene))
     if max_depth is not None:
         count_argument("max_depth", max_depth, alternative=" or None")
     return features_of(examine(scene, max_depth))

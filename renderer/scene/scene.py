@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import tomllib
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypedDict, Unpack
 
@@ -259,6 +259,11 @@ class SceneObject(Fields):
         rotate: ArrayLike = (0.0, 0.0, 0.0),
         translate: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None: ...
+
+    def _slips(self) -> Iterable[str]:
+        """A scale that leaves no area: one of a single 0 makes a mesh flat, which is seen."""
+        if self.scale.count(0.0) > 1:
+            yield f"scale: expected at most one factor of 0, got {self.scale}, which leaves nothing to see."
 
     def matrix(self) -> NDArray[np.float64]:
         """The transformation from the mesh's coordinates to the world's.
@@ -536,6 +541,12 @@ class Scene(Fields):
 _PLACED = ("objects", "floor", "up")
 
 
+def kind_of(value: object) -> str:
+    """What an error says that it got in the place of a ``Scene``."""
+    hint = ". load_scene makes a Scene of a file" if isinstance(value, str | os.PathLike) else ""
+    return f"{type(value).__name__}{hint}"
+
+
 def load_scene(path: FilePaths, *, up: Literal["x", "y", "z"] | None = None) -> Scene:
     """Read a scene file and its meshes, or put a scene around mesh files.
 
@@ -703,13 +714,17 @@ def _checked(table: dict[str, Any], where: str) -> Scene:
             _ = scene.instances
     except MeshError as error:
         raise SceneError(f"{where}: objects: {' '.join(str(error).split())}") from None
-    warn_of_slips(scene.camera, scene.materials, f"{where}: ")
+    warn_of_slips(scene.camera, scene.materials, f"{where}: ", scene.objects)
     return scene
 
 
-def warn_of_slips(camera: Camera | None, materials: Mapping[str, Material], where: str) -> None:
+def warn_of_slips(
+    camera: Camera | None, materials: Mapping[str, Material], where: str, objects: Sequence[SceneObject] = ()
+) -> None:
     """Warn with ``SceneWarning`` of values of tables that are probably slips; ``where`` begins the message."""
-    tables = {"camera": camera, **{f"materials.{name}": material for name, material in materials.items()}}
+    tables: dict[str, Fields | None] = {"camera": camera}
+    tables |= {f"materials.{name}": material for name, material in materials.items()}
+    tables |= {f"objects.{i}": each for i, each in enumerate(objects)}
     for key, table in tables.items():
         for slip in table._slips() if table else ():
             warnings.warn(f"{where}{key}.{slip}", SceneWarning, stacklevel=4)

@@ -521,8 +521,9 @@ def test_settings_of_render(name: str, bad: Any) -> None:
 
 @cases("bad", [None, "scene.toml", 3, {"camera": {}}, BOX, np.ones(3)])
 def test_render_takes_scenes(bad: Any) -> None:
-    with pytest.raises(ValueError, match=r"^scene: expected a Scene or a PreparedScene, got"):
+    with pytest.raises(ValueError, match=r"^scene: expected a Scene or a PreparedScene, got") as caught:
         render(bad, resolution=(4, 4))
+    assert ("load_scene" in str(caught.value)) == isinstance(bad, str)
     with pytest.raises(ValueError, match=r"^scene: expected a Scene, got"):
         needs_of(bad)
 

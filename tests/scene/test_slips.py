@@ -35,7 +35,7 @@ from renderer.scene.change import changed
 from renderer.viewer.viewpoint import camera_of
 
 AT: dict[str, Any] = {"eye": (0, 0, 5), "target": (0, 0, 0)}
-EIGHT_BITS = "diffuse: expected numbers from 0 to 1, got (255.0, 0.0, 0.0). Divide 8-bit colours by 255."
+EIGHT_BITS = "diffuse: expected numbers from 0 to 1, got (255.0, 0.0, 0.0), used as given. Divide 8-bit colours by 255."
 RECORDS = (
     Dielectric, DirectionalLight, Floor, Mirror, OrthographicCamera, PerspectiveCamera, Phong, PointLight,
     RenderSettings, Scene, SceneObject,
@@ -69,6 +69,20 @@ def test_a_colour_of_8_bits_is_a_slip(kind: Any, name: str) -> None:
     (said,) = slips(lambda: kind(**{name: (255, 0, 0)}))
     assert said.startswith(f"{kind.__name__}: {name}: expected numbers from 0 to 1, got (255.0, 0.0, 0.0)")
     assert slips(lambda: kind(**{name: 1.0})) == []
+
+
+@pytest.mark.judges("SceneObject", "SceneWarning", "scene.objects.scale")
+def test_a_scale_that_leaves_no_area_is_a_slip(tmp_path: Path) -> None:
+    for scale in (0, (1, 0, 0)):
+        (said,) = slips(lambda scale=scale: SceneObject(mesh=shapes.box(), scale=scale))
+        assert said.startswith("SceneObject: scale: expected") and "nothing to see" in said
+    assert slips(lambda: SceneObject(mesh=shapes.box(), scale=(1, 1, 0))) == []  # flat, and seen
+    shapes.box().save(tmp_path / "a.ply")
+    path = tmp_path / "s.toml"
+    path.write_text("camera = {eye = [0, 0, 5], target = [0, 0, 0]}\nmaterials.m = {}\n"
+                    "objects = [{mesh = 'a.ply', material = 'm', scale = 0}]\n")  # fmt: skip
+    (said,) = slips(lambda: load_scene(path))
+    assert said.startswith(f"{path}: objects.0.scale: expected")
 
 
 def test_slips_in_files_and_changes_are_told_once_and_with_their_key(
