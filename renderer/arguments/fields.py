@@ -40,7 +40,7 @@ Color = Annotated[tuple[_Channel, _Channel, _Channel], one_for(3)]
 
 
 class SceneWarning(UserWarning):
-    """A value that is allowed, and that is probably a slip: an angle in radians, or a colour from 0 to 255.
+    """A value that is allowed, and that is probably a slip: an angle in radians, a colour from 0 to 255, a scale of 0.
 
     Examples
     --------
