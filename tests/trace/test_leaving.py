@@ -288,6 +288,15 @@ def test_an_open_edge_stops_no_ray_and_sheets_in_one_plane_stop_it_at_the_lowest
         assert pile.closest_hit(edge, down, leaving=1, side=1).face == 0
 
 
+@cases("accelerator", [Octree, BruteForce])
+def test_where_a_wall_crosses_a_floor_it_stops_what_leads_through_it_alone(accelerator):
+    """Beside the wall the ray is above the floor or below it; what leads through both stops at the lower face."""
+    floor, wall = [[-4, -4, 0], [4, -4, 0], [0, 6, 0]], [[0, -4, -4], [0, 4, -4], [0, 0, 6]]
+    queries = accelerator([*floor, *wall], [[0, 1, 2], [3, 4, 5]])
+    stopped = queries.closest_hit([0, 0, 0], [[-0.3, 0.1, -1], [-0.3, 0.1, 1]], leaving=1, side=1)
+    assert (stopped.t == 0).all() and sorted(stopped.face) == [0, 1]
+
+
 def test_rays_go_on_from_hits_on_the_side_that_they_came_from_and_through_them_on_the_other():
     ball = icosphere(3)
     octree, rng = Octree.from_mesh(ball), np.random.default_rng(3)
