@@ -15,6 +15,7 @@ from renderer.system.terminal import flush_output, give_up_output, one_line, spe
 with resting():
     from renderer.cli.compiling import add_compile, choose_processor
     from renderer.cli.info import add_info
+    from renderer.cli.once import Parser
     from renderer.cli.radiosity import add_radiosity
     from renderer.cli.render import add_render
     from renderer.cli.study import add_study
@@ -94,7 +95,7 @@ class _Notices(logging.Handler):
 
 def make_parser() -> argparse.ArgumentParser:
     """The parser of all commands, each of which sets ``command``, the function that runs it."""
-    parser = argparse.ArgumentParser(prog="octree-render", description="Octree ray tracer for triangle meshes.")
+    parser = Parser(prog="octree-render", description="Octree ray tracer for triangle meshes.")
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=True, metavar="command")
     for add in (add_render, add_info, add_view, add_study, add_radiosity, add_compile):

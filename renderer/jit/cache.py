@@ -228,6 +228,9 @@ class _Chosen:
 @cache
 def _named_folders() -> tuple[Path, ...]:
     named = [Path(text) for text in os.environ.get(AHEAD_VARIABLE, "").split(os.pathsep) if text]
+    empty = [str(folder) for folder in named if not stored_in(folder)]
+    if empty:
+        warn_once("ahead", f"no compiled kernels are in {', '.join(empty)}, which {AHEAD_VARIABLE} names")
     return tuple(folder for folder in (*named, _CARRIED) if _is_folder(folder))
 
 

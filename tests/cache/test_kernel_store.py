@@ -12,7 +12,7 @@ from cases import cases
 from kernel_package import COMPILED, LOADED, MIDDLE, RUN, UPPER, bottom_of, run, start, write_package
 
 from renderer.jit.cache import _user_cache, _versions, runnable_levels
-from renderer.jit.levels import FEATURES, LEVELS, lacking
+from renderer.jit.levels import AHEAD_VARIABLE, FEATURES, LEVELS, lacking
 
 TELL = """
 import logging, sys
@@ -299,6 +299,14 @@ class TestAhead:
     def test_they_are_found_where_the_environment_names_them(self, package, folder, tmp_path):
         assert run(package, OCTREE_RENDERER_KERNELS=f"{tmp_path / 'none'}{os.pathsep}{folder}") == LOADED
         assert run(package) == COMPILED
+
+    @pytest.mark.parametrize("place", ["none", "empty"])
+    def test_a_folder_without_any_is_named_once(self, package, folder, tmp_path, place):
+        (tmp_path / "empty").mkdir()
+        look = "from renderer.jit.cache import ahead_folders as look\nfor _ in range(2): look()\n"
+        named = {AHEAD_VARIABLE: f"{folder}{os.pathsep}{tmp_path / place}"}
+        (said,) = start(package, look, **named).stderr.splitlines()
+        assert AHEAD_VARIABLE in said and str(tmp_path / place) in said and str(folder) not in said
 
     def test_a_package_may_carry_them(self, package, folder):
         folder.rename(package / "compiled")
