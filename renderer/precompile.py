@@ -6,7 +6,7 @@ Numba compiles in only one thread of a process, so a second process halves the w
 import os
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from functools import partial
 from logging import getLogger
 from pathlib import Path
@@ -226,7 +226,9 @@ def compile_ahead(what: str = "all", began: Callable[[str], object] = lambda nam
 
 def compile_into(folder: Path) -> None:
     """From now on keep compiled kernels only in ``folder``, to which no other run writes."""
-    folder.mkdir(parents=True, exist_ok=True)
+    with suppress(FileExistsError, NotADirectoryError):
+        folder.mkdir(parents=True, exist_ok=True)
+    expect(folder.is_dir(), "output", "a folder, or the path of a new one", repr(str(folder)))
     kernel_store.keep_in(folder)
 
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +71,17 @@ class RunFolder:
 
     def _path(self, name: str) -> Path:
         return self.folder / f"{name}.part"
+
+
+@contextmanager
+def naming_parts(folder: Path) -> Iterator[None]:
+    """A context in which Ctrl-C says that the same command goes on from the parts in ``folder``, if these are left."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        if folder.is_dir():
+            raise KeyboardInterrupt(f"the same command goes on from {folder}") from None
+        raise
 
 
 def remove_parts(folder: Path) -> None:

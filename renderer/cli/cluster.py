@@ -42,14 +42,15 @@ def render_on_cluster(scene: Any, asked: dict[str, Any], options: argparse.Names
     """The run of a picture whose arguments are ``asked``, when all its parts are there, and the picture."""
     import time
 
+    from renderer.checkpoints.folder import naming_parts
     from renderer.checkpoints.study import folder_of
     from renderer.cluster import render_on
 
     own = options.cluster == "local" or options.threads is None
     expect(own, "--threads", "none, as the cluster has its own", str(options.threads))
-    began = time.perf_counter()
-    with on_cluster(options) as client:
-        run = render_on(client, scene, folder_of(options.output), progress=not options.quiet, **asked)
+    folder, began = folder_of(options.output), time.perf_counter()
+    with naming_parts(folder), on_cluster(options) as client:
+        run = render_on(client, scene, folder, progress=not options.quiet, **asked)
     return run, run.image(time.perf_counter() - began)
 
 

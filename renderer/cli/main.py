@@ -2,6 +2,7 @@
 
 import argparse
 import logging
+import re
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
@@ -40,9 +41,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         give_up_output()
     except (ValueError, OSError, ImportError, MemoryError) as error:
         kind = "not enough memory" if isinstance(error, MemoryError) else ""
-        print(": ".join(filter(None, ("octree-render", kind, one_line(error)))), file=sys.stderr)
+        print(": ".join(filter(None, ("octree-render", kind, _without_none(one_line(error))))), file=sys.stderr)
         return 2
     return 0
+
+
+def _without_none(message: str) -> str:
+    """A message about an argument, in the words of a command line, where nothing is called None."""
+    return re.sub(r",? or None(?=, got )", "", message).replace(": expected None ", ": expected none ")
 
 
 def _hide_scipy_from_numba() -> None:

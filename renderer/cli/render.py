@@ -20,6 +20,8 @@ _CHANGE = (
     "replace the camera, the lights, materials, the ambient light, the background or sky, or keys of render, such as "
     "'render.shadows = false', or leave objects out, such as 'hide = [\"objects.0\", \"floor\"]'; may be given again"
 )
+# The options that are keys of a scene's settings.
+_SETTINGS = ("resolution", "samples", "filter", "max_depth", "min_weight", "max_rays")
 _FILTERS = ("box", "tent", "gaussian", "mitchell")
 _EXPOSURE = "make the picture 2^STOPS times as bright; default: 0"
 _TONE = "the tone curve of a .png or an animation; default: srgb, which clips what is brighter than white"
@@ -86,8 +88,7 @@ def _render(options: argparse.Namespace) -> None:
     _check_fits(options)
     (check_picture_path if options.frames is None else check_animation_path)(options.output)
     scene = _scene(options)
-    names = ("resolution", "samples", "filter", "max_depth", "min_weight", "max_rays", "accelerator", "split")
-    asked: dict[str, Any] = {name: getattr(options, name) for name in names}
+    asked: dict[str, Any] = {name: getattr(options, name) for name in (*_SETTINGS, "accelerator", "split")}
     asked["planes"] = PLANES if options.output.suffix.lower() == ".exr" else ("rays",)
     if options.frames is not None:
         render_turntable(scene, asked, options)
@@ -109,7 +110,7 @@ def _render(options: argparse.Namespace) -> None:
 def _scene(options: argparse.Namespace) -> Any:
     """The scene that is rendered, with the changes of the options."""
     from renderer.scene.change import changed
-    from renderer.scene.scene import load_scene, scene_files
+    from renderer.scene.scene import checked_settings, load_scene, scene_files
 
     files = scene_files(options.scene)
     scene = load_scene(files, up=options.up)
@@ -119,6 +120,7 @@ def _scene(options: argparse.Namespace) -> Any:
             scene = changed(scene, text)
         except ValueError as error:
             raise ValueError(f"--change: {error}") from None
+    checked_settings(scene.render, {name: getattr(options, name) for name in _SETTINGS}, scene.camera)
     write_scene_of(files, options)
     if not options.quiet:
         say_up(files, options.up)

@@ -10,7 +10,7 @@ from typing import Any
 from renderer.cli.cluster import add_cluster, on_cluster
 from renderer.cli.meshes import Files, kept_of, load_files, say_up, up_of, values_of_files
 from renderer.cli.render import resolution
-from renderer.cli.study_files import FORMATS, KINDS, layout_of, write
+from renderer.cli.study_files import FORMATS, KINDS, check_outputs, layout_of, write
 from renderer.cli.transmittance import add_transmittance, is_array, transmittance_of
 from renderer.cli.view_factors import add_view_factors, study_view_factors
 from renderer.errors import expect
@@ -104,7 +104,8 @@ def _study(options: argparse.Namespace) -> None:
     # Imported here so that --help and --version need no compiler.
     import time
 
-    from renderer.checkpoints.study import Study
+    from renderer.checkpoints.folder import naming_parts
+    from renderer.checkpoints.study import Study, folder_of
     from renderer.mesh.load import mesh_paths
     from renderer.octree import Octree
 
@@ -117,21 +118,22 @@ def _study(options: argparse.Namespace) -> None:
     paths = kept_of(options.mesh, options.hide)
     up, line = up_of(paths, options.up)
     made = _options_of(options, up)
-    _say_up(line, options, made)
     layout = layout_of(options)
     files = load_files(paths)
     if options.transmittance:
         made["transmittance"] = transmittance_of(files, options.transmittance)
     octree = Octree.from_mesh(files.mesh, threads=options.threads)
     chosen = _chosen(octree, options, up)
+    _say_up(line, options, made)
     began = time.perf_counter()
-    parts = _run(octree, Study(options.kind, made), chosen.points, options)
-    seconds = time.perf_counter() - began
-    for output in options.output:
-        if output.suffix.lower() == ".npy" and chosen.of_faces is None and chosen.of_vertices is None:
-            parts.join(output)
-        else:
-            write(output, options, octree.mesh, chosen, parts.joined(), layout, up)
+    with naming_parts(folder_of(options.output[0])):
+        parts = _run(octree, Study(options.kind, made), chosen.points, options)
+        seconds = time.perf_counter() - began
+        for output in options.output:
+            if output.suffix.lower() == ".npy" and chosen.of_faces is None and chosen.of_vertices is None:
+                parts.join(output)
+            else:
+                write(output, options, octree.mesh, chosen, parts.joined(), layout, up)
     if not options.quiet:
         _say_result(options, files, chosen, parts, seconds)
     # Last, so that no work is lost if a file cannot be written.
@@ -171,23 +173,18 @@ def _run(octree: Any, study: Any, points: Any, options: argparse.Namespace) -> A
 
 def _check_output(options: argparse.Namespace) -> None:
     """Refuse outputs that cannot be written before the work begins."""
-    from renderer.system.files import are_apart, check_writable
-
     on_mesh = options.grid is None and options.points is None
     arrays = (Path(word) for word in options.transmittance if is_array(word))
     given = (*options.mesh, options.points, options.suns, options.camera, *arrays)
-    read = [file for file in given if file is not None]
     for output in options.output:
         suffix = output.suffix.lower()
         expect(suffix in FORMATS, "--output", f"one of {', '.join(FORMATS)}", str(output))
-        expect(are_apart([output], read), "--output", "a file that is not an input", str(output))
         expect(suffix != ".png" or on_mesh, "--output", ".npy or .ply, as a picture needs faces", str(output))
+    check_outputs(options.output, [file for file in given if file is not None])
+    pictures = any(output.suffix.lower() == ".png" for output in options.output)
     named = ", ".join(map(str, options.output))
-    expect(are_apart(options.output), "--output", "each file once", named)
-    seen = options.camera is None or any(output.suffix.lower() == ".png" for output in options.output)
-    expect(seen, "--camera", "an output that ends in .png", named)
-    for output in options.output:
-        check_writable(output)
+    for name in ("camera", "resolution"):
+        _expect(pictures or getattr(options, name) is None, name, "an output that ends in .png", named)
 
 
 def _check_options(options: argparse.Namespace) -> None:

@@ -1,6 +1,7 @@
-"""The files of a study of points: the camera and size of a picture, and what each suffix has."""
+"""The files of a study: those that can be written, the camera and size of a picture, and what each suffix has."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +19,18 @@ class Layout(NamedTuple):
     camera: Any
     size: tuple[int, int]
     legend_rows: int
+
+
+def check_outputs(outputs: Sequence[Path], read: Sequence[str | Path]) -> None:
+    """Refuse outputs that cannot be written, and those that are one file or an input."""
+    from renderer.system.files import are_apart, check_writable
+
+    for output in outputs:
+        expect(are_apart([output], read), "--output", "a file that is not an input", str(output))
+    expect(are_apart(outputs), "--output", "each file once", ", ".join(map(str, outputs)))
+    for output in outputs:
+        expect(output.parent.is_dir(), "--output", "a path in an existing folder", str(output))
+        check_writable(output)
 
 
 def layout_of(options: argparse.Namespace) -> Layout:

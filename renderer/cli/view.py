@@ -24,10 +24,10 @@ def _view(options: argparse.Namespace) -> None:
     from renderer.viewer.view import view
 
     write_scene_of([options.scene], options)
-    say_up([options.scene], options.up)
     served = view(options.scene, up=options.up, host=options.host, port=options.port, browser=False)
     # Ctrl-C is the usual way to end it, so no failure, from the moment on that the address stands there.
     with served as viewing, suppress(KeyboardInterrupt):
+        say_up([options.scene], options.up)
         say(f"{options.scene} is shown at {viewing.url} until Ctrl-C", flush=True)
         if not options.no_browser:
             viewing.open_browser()

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from renderer.cli.cluster import on_cluster
 from renderer.cli.meshes import Files, kept_of, load_files
+from renderer.cli.study_files import check_outputs
 from renderer.cli.transmittance import is_array, transmittance_of
 from renderer.errors import expect
 from renderer.system.terminal import say
@@ -48,7 +49,7 @@ def study_view_factors(options: argparse.Namespace) -> None:
     import time
     from dataclasses import replace
 
-    from renderer.checkpoints.folder import remove_parts
+    from renderer.checkpoints.folder import naming_parts, remove_parts
     from renderer.checkpoints.study import folder_of
     from renderer.mesh.load import mesh_paths
     from renderer.octree import Octree
@@ -63,10 +64,11 @@ def study_view_factors(options: argparse.Namespace) -> None:
     made["transmittance"] = transmittance_of(files, options.transmittance)
     octree = Octree.from_mesh(files.mesh, threads=options.threads)
     folder, began = folder_of(options.output[0]), time.perf_counter()
-    found = replace(_run(octree, folder, surfaces.groups, made, options), names=surfaces.names)
-    seconds = time.perf_counter() - began
-    for output in options.output:
-        found.save(output)
+    with naming_parts(folder):
+        found = replace(_run(octree, folder, surfaces.groups, made, options), names=surfaces.names)
+        seconds = time.perf_counter() - began
+        for output in options.output:
+            found.save(output)
     _say_backs(found)
     if not options.quiet:
         outputs, rays = ", ".join(map(str, options.output)), int(found.rays.sum())
@@ -103,15 +105,10 @@ def _say_backs(found: Any) -> None:
 def _check_output(options: argparse.Namespace, surfaces: int) -> None:
     """Refuse outputs that cannot be written before the work begins."""
     from renderer.studies.factors.saved import check_factors_path
-    from renderer.system.files import are_apart, check_writable
 
-    read = (*options.mesh, *(word for word in options.transmittance if is_array(word)))
     for output in options.output:
         check_factors_path("--output", output, surfaces)
-        expect(are_apart([output], read), "--output", "a file that is not an input", str(output))
-    expect(are_apart(options.output), "--output", "each file once", ", ".join(map(str, options.output)))
-    for output in options.output:
-        check_writable(output)
+    check_outputs(options.output, [*options.mesh, *filter(is_array, options.transmittance)])
 
 
 def _surfaces(files: Files, groups: str | None) -> Surfaces:

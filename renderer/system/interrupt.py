@@ -25,7 +25,9 @@ class Command(Protocol):
 
 
 def interruptible(message: str) -> Callable[[Command], Command]:
-    """Let a command print ``message`` to standard error and return ``INTERRUPTED`` on Ctrl-C."""
+    """Let a command print ``message``, and what the KeyboardInterrupt says, to standard error and return
+    ``INTERRUPTED`` on Ctrl-C.
+    """
 
     def decorate(command: Command) -> Command:
         @wraps(command)
@@ -36,12 +38,12 @@ def interruptible(message: str) -> Callable[[Command], Command]:
             try:
                 with _ends_clean(ended_by, own_process), ends_while_compiling(message, own_process):
                     code = command(arguments)
-            except KeyboardInterrupt:
+            except KeyboardInterrupt as interrupt:
                 # Another Ctrl-C, as where Python waits for a thread that compiles, ends the process at once.
                 if own_process and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
                     signal.signal(signal.SIGINT, signal.SIG_DFL)
                 if not ended_by:
-                    print(message, file=sys.stderr)
+                    print("; ".join(map(str, (message, *interrupt.args))), file=sys.stderr)
             if ended_by:
                 # By the signal itself, as without a handler, so that its sender sees that it took effect; also where
                 # the command took it for Ctrl-C and ended well.

@@ -66,7 +66,8 @@ def _run(*arguments: object) -> int:
         (["sky", "--points", "none.npy", "-o", "a.npy"], "none.npy"),
         (["sky", "--camera", "s.toml", "-o", "a.npy"], "--camera: expected an output that ends in .png"),
         (["sun", "--suns", "suns.txt", "-o", "a.npy"], "weights: expected"),
-        (["sky", "-o", "none/a.npy"], "none/a.npy"),
+        (["sky", "-o", "none/a.npy"], "--output: expected a path in an existing folder, got none/a.npy"),
+        (["sky", "--resolution", "20", "-o", "a.npy"], "--resolution: expected an output that ends in .png"),
         (["sky", "--height", "1", "-o", "a.npy"], "--height: expected none without --grid"),
         (["sky", "--bounds", *"000111", "-o", "a.npy"], "--bounds: expected none without --grid"),
         (["sky", "--grid", "1", "--height", "nan", "-o", "a.npy"], "--height: expected a finite number, got nan"),
@@ -85,6 +86,12 @@ def test_bad_arguments_are_told_on_one_line(
     text = capsys.readouterr().err
     assert said in text and text.count("\n") == 1
     assert [path.name for path in tmp_path.iterdir()] == ["suns.txt"]
+
+
+def test_no_axis_is_said_of_a_file_that_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "s.toml").touch()
+    assert main(["study", "sky", str(tmp_path / "s.toml"), "-o", str(tmp_path / "a.npy")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
 
 
 def test_files_that_are_no_points_or_suns_are_refused(
@@ -146,6 +153,20 @@ def test_a_run_that_is_killed_goes_on_and_ends_with_the_same_bits(
     assert main(arguments) == 0 and not folder.exists()
     expected = sky_view_factor(octree, points, [0.0, 0.0, 1.0])
     assert np.load(result).tobytes() == expected.tobytes()
+
+
+@pytest.mark.parametrize("left", [False, True])
+def test_ctrl_c_names_the_parts_that_are_left(
+    city: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], left: bool
+) -> None:
+    def stops(*told: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(studies.Parts if left else studies, "write" if left else "parts_of", stops)
+    assert _run("sky", city, "-o", tmp_path / "a.npy") == 130
+    said, folder = capsys.readouterr().err, studies.folder_of(tmp_path / "a.npy")
+    assert said.startswith("octree-render: interrupted") and said.count("\n") == 1
+    assert folder.exists() == (str(folder) in said) == left
 
 
 def test_several_outputs_are_of_one_study(city: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

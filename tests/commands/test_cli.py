@@ -119,6 +119,7 @@ def test_bad_input_is_one_line(
     message = fails(capsys, "render", *arguments)
     for words in says:
         assert words in message
+    assert "None" not in message
     assert list(tmp_path.iterdir()) == []
 
 
@@ -318,6 +319,13 @@ def test_compile_fails_where_nothing_can_be_kept(tmp_path: Path) -> None:
 def test_kernels_for_a_level_need_a_folder(capsys: pytest.CaptureFixture[str]) -> None:
     said = fails(capsys, "compile", "--level", "x86-64-v3")
     assert said.startswith("--output: expected a folder, as kernels for a level are not this machine's")
+
+
+@cases("under", ["", "more"])
+def test_kernels_are_not_kept_in_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str], under: str) -> None:
+    (tmp_path / "a.obj").touch()
+    said = fails(capsys, "compile", "--queries", "-o", tmp_path / "a.obj" / under)
+    assert said.startswith("output: expected a folder") and "a.obj" in said
 
 
 def test_kernels_for_another_architecture_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -130,7 +130,8 @@ def test_the_command_says_once_which_axis_it_took(tmp_path: Path, capsys: pytest
     assert load_scene(written).up == "z" and NOTICE not in capsys.readouterr().err
     assert main(["render", written, *rest]) == 0 and NOTICE not in capsys.readouterr().err
     assert main(["render", written, *rest, "--up", "z"]) == 2
-    assert capsys.readouterr().err.startswith("octree-render: up: expected None for a scene file")
+    assert capsys.readouterr().err.startswith("octree-render: up: expected none for a scene file")
+    assert main(["render", file, "-o", out, "--samples", "3"]) == 2 and NOTICE not in capsys.readouterr().err
 
 
 @pytest.mark.judges("octree-render view --up", "view")
