@@ -173,16 +173,14 @@ def _run(octree: Any, study: Any, points: Any, options: argparse.Namespace) -> A
 
 def _check_output(options: argparse.Namespace) -> None:
     """Refuse outputs that cannot be written before the work begins."""
-    on_mesh = options.grid is None and options.points is None
     arrays = (Path(word) for word in options.transmittance if is_array(word))
     given = (*options.mesh, options.points, options.suns, options.camera, *arrays)
     for output in options.output:
-        suffix = output.suffix.lower()
-        expect(suffix in FORMATS, "--output", f"one of {', '.join(FORMATS)}", str(output))
-        expect(suffix != ".png" or on_mesh, "--output", ".npy or .ply, as a picture needs faces", str(output))
+        expect(output.suffix.lower() in FORMATS, "--output", f"one of {', '.join(FORMATS)}", str(output))
     check_outputs(options.output, [file for file in given if file is not None])
     pictures = any(output.suffix.lower() == ".png" for output in options.output)
-    named = ", ".join(map(str, options.output))
+    on_mesh, named = options.grid is None and options.points is None, ", ".join(map(str, options.output))
+    expect(on_mesh or not pictures, "--output", ".npy or .ply, as a picture needs faces", named)
     for name in ("camera", "resolution"):
         _expect(pictures or getattr(options, name) is None, name, "an output that ends in .png", named)
 

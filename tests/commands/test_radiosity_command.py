@@ -105,7 +105,8 @@ def radiance(**options: Any) -> Any:
 )
 def test_a_picture_is_that_of_the_lit_scene(folder: Path, words: list[str], given: dict[str, Any]) -> None:
     usual = {"edge": 0.45, "rtol": 0.01}
-    run("--edge", 0.45, "--rtol", 0.01, *words, "-o", "a.npy")
+    told = {"--edge": "0.45", "--rtol": "0.01"} | dict([words] if words else [])
+    run(*(word for option in told.items() for word in option), "-o", "a.npy")
     expected = radiance(**{**usual, **given})
     assert np.array_equal(np.load("a.npy"), expected)
     assert np.array_equal(expected, radiance(**usual)) == (given.keys() <= {"threads"})

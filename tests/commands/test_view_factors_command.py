@@ -78,7 +78,8 @@ def test_the_result_is_that_of_the_function_with_the_options_argument(room: Path
     words, given = ASKED[name]
     octree, usual = Octree.from_mesh(load_mesh(room)), {"rtol": 0.02, "max_rays": 512}
     expected = view_factors(octree, **(usual | given))
-    found = found_of(tmp_path / "f.npz", room, "--rtol", 0.02, "--max-rays", 512, *words)
+    told = {"--rtol": 0.02, "--max-rays": 512} | dict([words] if words else [])
+    found = found_of(tmp_path / "f.npz", room, *(word for option in told.items() for word in option))
     assert same_bits(found, expected) and found.names is None
     changes = name in ("--sides", "--rtol", "--max-rays")
     assert same_bits(found, view_factors(octree, **usual)) == (not changes)
