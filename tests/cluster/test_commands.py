@@ -52,7 +52,7 @@ def test_a_study_of_a_cluster_has_the_bytes_of_this_machine_and_says_nothing_whe
         (["--cluster", "x://y"], "x"),
         (["--cluster", "tcp://127.0.0.1:9", "--threads", "2"], "--threads: expected none, as the cluster has its own"),
         (["--cluster", "--threads", "0"], "threads: expected an integer >= 1"),
-        (["--cluster", "--samples", "3", "--threads", "1"], "samples: expected a square number"),
+        (["--cluster", "--min-weight", "2", "--threads", "1"], "min_weight: expected"),
     ],
 )
 def test_what_is_wrong_is_told_on_one_line(
