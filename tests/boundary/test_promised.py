@@ -449,7 +449,7 @@ def test_what_the_command_is_told_is_handed_on_and_the_rest_left_to_the_library(
     given = {"max_depth": 7, "samples": 9, "min_weight": 0.25, "max_rays": 99, "accelerator": "brute",
              "split": "midpoint", "threads": 5}  # fmt: skip
     # The ends of their ranges: 0 is a value like any other, not one that was left out.
-    ends: list[dict[str, Any]] = [{"max_depth": 0, "min_weight": 0.0}, {"max_depth": 64, "min_weight": 1.0}]
+    ends: list[dict[str, Any]] = [{"max_depth": 0, "min_weight": 0.0}, {"max_depth": 64, "min_weight": 1.0 - 2.0**-53}]
     for options in (given, *ends):
         flags = [word for name, value in options.items() for word in (f"--{name.replace('_', '-')}", str(value))]
         assert main([*command, *flags, "--resolution", "30X20"]) == 0
