@@ -79,6 +79,10 @@ def _check_outputs(options: argparse.Namespace) -> None:
     suffixes = [check_output_path(output, (*_PICTURES, *LIT_FORMATS)).suffix.lower() for output in options.output]
     if ".exr" in suffixes:
         check_exr()
+    named = ", ".join(map(str, options.output))
+    for name in ("resolution", "samples"):
+        unused = getattr(options, name) is not None and not {*suffixes} & {*_PICTURES}
+        expect(not unused, f"--{name}", "a picture among the outputs", named)
     toned = options.tone == "srgb" or ".png" in suffixes
     expect(toned, "--tone", "a .png file", repr(str(options.output[0])))
 

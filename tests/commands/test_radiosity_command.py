@@ -197,6 +197,7 @@ def test_progress_is_shown_unless_quiet(folder: Path, monkeypatch: pytest.Monkey
         (["-o", "lamp.ply"], "--output: expected other files than the scene's own"),
         (["-o", "a.png", "-o", "a.png"], "each once"),
         (["-o", "a.npy", "--tone", "aces"], "--tone: expected a .png file"),
+        (["-o", "a.ply", "--samples", "4"], "--samples: expected a picture"),
         (["-o", "a.npy", "--edge", "0"], "edge: expected"),
         (["-o", "a.npy", "--edge", "1", "--rtol", "-1"], "rtol: expected"),
         (["-o", "a.npy", "--edge", "1", "--max-rays", "3"], "max_rays: expected"),
