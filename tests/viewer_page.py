@@ -188,6 +188,7 @@ class Viewer:
                 const { viewer } = window;
                 document.querySelector("#settings").reset();
                 viewer.panel.load(viewer.scene);
+                for (const fold of document.querySelectorAll("details.fold")) fold.open = true;
                 viewer.changed("boxes");
                 viewer.changed("walk");
                 viewer.rays.close();
