@@ -124,17 +124,21 @@ def test_the_address_has_the_sky_and_undo_takes_it_away(browser: Any, url: str, 
     with Viewer(browser, url).open() as one:
         one.page.wait_for_function(written)
         switch(one, "Sky").click()
+        one.page.wait_for_function(written)  # a step of its own, however slow the machine is
         field(one, "Ambient light, green").fill("0.3")
         sky = {"sky": Sky(lights=32), "background": 0, "ambient": (0.1, 0.3, 0.1)}
         shows(one, scene.altered(**sky))
         one.page.wait_for_function(written)
         link = one.page.url
-        one.page.locator("#stage").press("Control+z")
+        for steps in (1, 0):
+            one.page.locator("#stage").press("Control+z")
+            one.page.wait_for_function("(steps) => viewer.past.steps === steps", arg=steps)
         one.page.wait_for_function("() => !viewer.panel.settings.edits")
         assert not switch(one, "Sky").is_checked() and field(one, "Ambient light, green").input_value() == "0.1"
         shows(one, scene)
-        one.page.click("#redo")
-        one.page.wait_for_function("() => viewer.panel.settings.edits")
+        for steps in (1, 2):
+            one.page.click("#redo")
+            one.page.wait_for_function("(steps) => viewer.past.steps === steps", arg=steps)
         shows(one, scene.altered(**sky))
     assert "sky" in parse_qs(urlsplit(link).fragment)["edits"][0]
     with Viewer(browser, link).open() as two:
