@@ -15,8 +15,8 @@ from renderer.numerics.vec3 import add, barycentric, cross, dot, largest_compone
 from renderer.trace.edge_signs import corners_at
 from renderer.trace.intersect import face_in
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
-from renderer.trace.leaf import octants_around
 from renderer.trace.starts.anchor import anchor_of
+from renderer.trace.starts.around import areas_at, box_holds, enter_around
 from renderer.trace.starts.cone import NUMBER, PLACE, ZEROS, add_holder, holder, put_holder
 from renderer.trace.starts.meeting import has_area, height_sign, seen_from, turn_sign, unit_direction
 from renderer.trace.starts.record import BARYCENTRIC, Start, corners_in
@@ -131,20 +131,10 @@ def _passed_at(tree, place, met):
 @kernel
 def _spot_of(tree, place, number, met):
     """The ``Spot`` of a member."""
-    _, around = _areas_at(corners_at(tree, place), met.o)
+    _, around = areas_at(corners_at(tree, place), met.o)
     e0, e1, e2 = maximum(around[0], 0.0), maximum(around[1], 0.0), maximum(around[2], 0.0)
     whole = e0 + e1 + e2
     return Spot(number, e1 / whole, e2 / whole)
-
-
-@inlined
-def _areas_at(corners, o):
-    """The normal of a face, and for each corner its product with the normal of the face that has the point in place of
-    that corner.
-    """
-    a, b, c = sub(corners[0], o), sub(corners[1], o), sub(corners[2], o)
-    n = cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]))
-    return n, (dot(n, cross(b, c)), dot(n, cross(c, a)), dot(n, cross(a, b)))
 
 
 @kernel
@@ -199,12 +189,7 @@ def list_near(tree, surfaces, spot, stack, holders):
     room = 4.0 * CORNER_ERROR * largest_of_three(*corners)
     low, high = sub(o, (room, room, room)), add(o, (room, room, room))
     query = _Around(o, room, low, high, surfaces, holders)
-    return walk(tree, stack, query, np.int64(0), _enter, _list_in)
-
-
-@inlined
-def _enter(tree, query, node, count):
-    return count, octants_around(tree, node, query.low, query.high)
+    return walk(tree, stack, query, np.int64(0), enter_around, _list_in)
 
 
 @inlined
@@ -223,12 +208,10 @@ def _list_in(tree, query, first, blocks, count):
 @kernel
 def _hold_sign(corners, o, room):
     """1 if a face contains a point, -1 if not, 0 if rounding could decide."""
+    if not box_holds(corners, o, room):
+        return -1
     a, b, c = corners
-    for k in range(3):
-        low, high = minimum(a[k], minimum(b[k], c[k])), maximum(a[k], maximum(b[k], c[k]))
-        if o[k] < low - room or o[k] > high + room:
-            return -1
-    n, (e0, e1, e2) = _areas_at(corners, o)
+    n, (e0, e1, e2) = areas_at(corners, o)
     reach = largest_of_three(sub(a, o), sub(b, o), sub(c, o))
     error, least = _BESIDE * largest_component(n) * reach * (reach + room), minimum(e0, minimum(e1, e2))
     return 1 if least > error else (-1 if least < -error else 0)

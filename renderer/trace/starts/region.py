@@ -81,12 +81,22 @@ def _parity_beside(cone, own, hub, middle, side):
     where = within_cone(cone, middle)
     if where < 0:
         return 0
-    coincides = lean_sign(cone.face, own.first) == 0 and lean_sign(cone.face, own.second) == 0
     faced = lean_sign(cone.face, hub)
-    if where == 0 or not coincides or faced == 0:
+    if where == 0 or not _lies_in_plane(cone.face, own) or faced == 0:
         return UNKNOWN
-    turned = dot_pairs(cone.face.normal, own.face.normal)[0] < 0.0
-    return int(faced != (-side if turned else side))
+    return int(faced != (-side if _is_turned(cone.face, own) else side))
+
+
+@inlined
+def _lies_in_plane(face, cone):
+    """Whether a face lies in the plane of a cone."""
+    return lean_sign(face, cone.first) == 0 and lean_sign(face, cone.second) == 0
+
+
+@inlined
+def _is_turned(face, cone):
+    """Whether the normals of a face and a cone in one plane are opposite."""
+    return dot_pairs(face.normal, cone.face.normal)[0] < 0.0
 
 
 @kernel
@@ -215,10 +225,7 @@ def _is_same_plane(tree, anchor, holders, k, cone, d, slope):
     if holder(holders, k, ZEROS) != 0:
         return False
     face = cone_of(tree, anchor, holders, k).face
-    if lean_sign(face, cone.first) != 0 or lean_sign(face, cone.second) != 0:
-        return False
-    turned = dot_pairs(face.normal, cone.face.normal)[0] < 0.0
-    return slope_of(face, d) == (-slope if turned else slope)
+    return _lies_in_plane(face, cone) and slope_of(face, d) == (-slope if _is_turned(face, cone) else slope)
 
 
 @kernel
@@ -330,7 +337,7 @@ def _lower(holders, k, j):
 def coincide(tree, anchor, holders, k, j):
     """Whether the j-th holder's cone lies in the plane of the k-th one and the k-th one contains its middle."""
     own, cone = cone_of(tree, anchor, holders, k), cone_of(tree, anchor, holders, j)
-    if lean_sign(cone.face, own.first) != 0 or lean_sign(cone.face, own.second) != 0:
+    if not _lies_in_plane(cone.face, own):
         return False
     for attempt in range(ATTEMPTS):
         where = within_cone(cone, middle_of(own, attempt))

@@ -10,8 +10,8 @@ import numpy as np
 
 from renderer.jit.decorators import apart, inlined, kernel
 from renderer.numerics.double_double import as_pairs, cross_pairs, dot_pairs, power_below, quotient, scaled_difference
-from renderer.numerics.simd import local_doubles, lowest_bit, maximum, minimum, pointer, store
-from renderer.numerics.vec3 import add, cross, dot, largest_component, largest_of_three, sub
+from renderer.numerics.simd import local_doubles, lowest_bit, maximum, pointer, store
+from renderer.numerics.vec3 import add, largest_component, sub
 from renderer.trace.best import NO_FACE, Best, FaceHit, hit_on, is_better, no_hit
 from renderer.trace.edge_signs import corners_at
 from renderer.trace.intersect import (
@@ -25,10 +25,11 @@ from renderer.trace.intersect import (
     slack_of,
 )
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
-from renderer.trace.leaf import octants_around, resolved_hit
+from renderer.trace.leaf import resolved_hit
 from renderer.trace.single_ray import Found, SingleRay, enter_counted, prepare_single
 from renderer.trace.starts.anchor import anchor_of, from_anchor, rounded
 from renderer.trace.starts.arcs import arcs_of
+from renderer.trace.starts.around import box_holds, enter_around, is_beside
 from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, cone_of, holder, make_holders
 from renderer.trace.starts.fan import clear_fan, write_fan
 from renderer.trace.starts.meeting import (
@@ -70,39 +71,12 @@ from renderer.trace.walk import always, walk, walk_nearest_first
 
 # The boxes of the faces that hold a start hold it as rounded, with so much room of its coordinates.
 _ROOM = 2.0**-50
-# The share of lengths by which products of four differences in float64 err.
-_ROUNDED = 2.0**-44
 # The t of a hit on the next face of a pile, which differs from others at t = 0 by its sign.
 AHEAD = -0.0
 # The least t of a face that does not hold the start: what is less would be 0 in the mesh's own units.
 _LEAST_T = 2.0**-900
 # A hit that is farther than so often its slack errs by less than 2^-20 of t by where the ray starts.
 _NEAR_HIT = 2.0**20
-
-
-@inlined
-def _box_holds(tree, place, o, room):
-    """Whether the box of a face, widened by ``room``, contains a point."""
-    p0, p1, p2 = corners_at(tree, place)
-    holds = True
-    for k in range(3):
-        low, high = minimum(p0[k], minimum(p1[k], p2[k])), maximum(p0[k], maximum(p1[k], p2[k]))
-        holds = holds and low - room <= o[k] and o[k] <= high + room
-    return holds
-
-
-@inlined
-def _is_beside(tree, place, o, room):
-    """Whether a point is surely beside a face, seen along its normal, wherever it is within ``room`` of o."""
-    p0, p1, p2 = corners_at(tree, place)
-    one, other, a, b, c = sub(p1, p0), sub(p2, p0), sub(p0, o), sub(p1, o), sub(p2, o)
-    n = cross(one, other)
-    side = largest_component(one) + largest_component(other)
-    reach = largest_of_three(a, b, c) + room
-    # An edge function errs by some 100 u of all these lengths, and by what moves the point.
-    error = side * side * reach * (reach * _ROUNDED + 12.0 * room)
-    e0, e1, e2 = dot(n, cross(b, c)), dot(n, cross(c, a)), dot(n, cross(a, b))
-    return minimum(e0, minimum(e1, e2)) < -error
 
 
 class _Surroundings(NamedTuple):
@@ -127,12 +101,12 @@ def list_holders(tree, anchor, stack, holders, mask, ignored):
     room = largest_component(o) * _ROOM
     low, high = sub(o, (room, room, room)), add(o, (room, room, room))
     query = _Surroundings(anchor, o, room, low, high, holders, mask, ignored)
-    return walk(tree, stack, query, np.int64(0), _enter_around, _add_holders)
+    return walk(tree, stack, query, np.int64(0), enter_around, _add_holders)
 
 
 @inlined
-def _enter_around(tree, query, node, count):
-    return count, octants_around(tree, node, query.low, query.high)
+def _may_hold(corners, query):
+    return box_holds(corners, query.o, query.room) and not is_beside(corners, query.o, query.room)
 
 
 @kernel
@@ -144,11 +118,7 @@ def _add_holders(tree, query, first, blocks, count):
     for block in range(first, first + blocks):
         for i in range(BLOCK_FACES):
             face, place = face_in(tree, block * BLOCK_FACES + i), block * BLOCK_WORDS + i
-            if (
-                face >= 0
-                and _box_holds(tree, place, query.o, query.room)
-                and not _is_beside(tree, place, query.o, query.room)
-            ):
+            if face >= 0 and _may_hold(corners_at(tree, place), query):
                 zeros = zeros_if_held(seen_from(tree, place, query.anchor), query.anchor)
                 if zeros >= 0:
                     count = add_holder(query.holders, count, place, face, zeros)
