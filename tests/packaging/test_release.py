@@ -155,8 +155,17 @@ def test_workflows_and_forms_are_yaml_and_actions_are_pinned_by_commit(path):
         assert re.search(r"uses: [\w/-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+$", line), line
 
 
+def test_what_a_workflow_runs_is_there():
+    jobs = yaml.safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8"))["jobs"]
+    lines = [step["run"] for job in jobs.values() for step in job["steps"] if "run" in step]
+    paths = {path for line in lines for path in re.findall(r"(?:tests|\.ci)/[\w./]+", line)}
+    assert len(paths) > 3 and not {path for path in paths if not (ROOT / path).exists()}
+    targets = " ".join(jobs["prove"]["strategy"]["matrix"]["targets"]).split()
+    known = re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    assert {"lint", "test", "test-slow", "docs", "validate"} == set(targets) <= set(known)
+
+
 def test_each_classifier_of_a_version_is_one_that_is_tried():
-    """By .ci/run, in the job prove."""
     jobs = yaml.safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8"))["jobs"]
     named = re.findall(r"Python :: (3\.\d+)", "\n".join(PROJECT["classifiers"]))
     assert named == jobs["prove"]["strategy"]["matrix"]["python"]

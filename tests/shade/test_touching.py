@@ -204,6 +204,18 @@ class TestGlassOnGlass:
             image = picture(scene(*order, eye=(5, 9, 0.2), target=(5, 0, 0.2), fov=0.1, background=1.0), 8)
             np.testing.assert_allclose(image.radiance, passed(0, 1, 1.5, 1), rtol=1e-5)
 
+    def test_on_an_edge_far_from_the_origin(self) -> None:
+        """Rounding there moves points by more than faces let through: straight down onto a diagonal of both."""
+        (x, z), size = (1e6, 3e6), 0.01
+        parts = [(box((x, y, z), (x + size, y + 1, z + size)), clear(1.5)) for y in (0, 1)]
+        what = scene(*parts, eye=(x, 9, z), target=(x, 0, z), background=1.0)
+        prepared = prepare_scene(what, needs_of(what, max_depth=8), "octree", threads=1)
+        for share in np.linspace(0.01, 0.99, 50):
+            at = share * size
+            for other in (at, size - at):
+                path = ray_path(prepared, (x + at, 9, z + other), (0, -1, 0), 8)
+                assert sum(s.radiance[0] for s in path) == pytest.approx(passed(0, 1, 1.5, 1), rel=1e-6)
+
 
 def other_diagonals(mesh: Mesh) -> Mesh:
     """A box of the same place whose squares are halved along their other diagonals."""

@@ -1,4 +1,4 @@
-"""The faces around a point, in float64: those whose boxes hold it, without those that it is surely beside."""
+"""The faces around a point, in float64: those whose boxes hold it, and whether they surely do or do not."""
 
 from renderer.jit.decorators import inlined
 from renderer.numerics.simd import maximum, minimum
@@ -37,12 +37,15 @@ def areas_at(corners, o):
 
 
 @inlined
-def is_beside(corners, o, room):
-    """Whether a point is surely beside a face, seen along its normal, wherever it is within ``room`` of o."""
+def hold_sign(corners, o, room):
+    """1 if a face, seen along its normal, contains every point within ``room`` of o; -1 if none; 0 if float64 cannot
+    tell.
+    """
     p0, p1, p2 = corners
     side = largest_component(sub(p1, p0)) + largest_component(sub(p2, p0))
     reach = largest_of_three(sub(p0, o), sub(p1, o), sub(p2, o)) + room
     # An area errs by some 100 u of all these lengths, and by what moves the point.
     error = side * side * reach * (reach * _ROUNDED + 12.0 * room)
     _, (e0, e1, e2) = areas_at(corners, o)
-    return minimum(e0, minimum(e1, e2)) < -error
+    least = minimum(e0, minimum(e1, e2))
+    return 1 if least > error else (-1 if least < -error else 0)

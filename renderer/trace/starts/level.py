@@ -16,7 +16,7 @@ from renderer.trace.edge_signs import corners_at
 from renderer.trace.intersect import face_in
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.starts.anchor import anchor_of
-from renderer.trace.starts.around import areas_at, box_holds, enter_around
+from renderer.trace.starts.around import areas_at, box_holds, enter_around, hold_sign
 from renderer.trace.starts.cone import NUMBER, PLACE, ZEROS, add_holder, holder, put_holder
 from renderer.trace.starts.meeting import has_area, height_sign, seen_from, turn_sign, unit_direction
 from renderer.trace.starts.record import BARYCENTRIC, Start, corners_in
@@ -27,8 +27,6 @@ NO_MEMBER = -1
 CORNER_ERROR = 2.0**-49
 # A face contains the hit if it contains a point so far inside the face hit, at these weights of its corners.
 _INWARDS, _U, _V = 2.0**-44, 0.3217, 0.4159
-# The share of the products of lengths that decide the side of an edge that counts as rounding.
-_BESIDE = 2.0**-36
 
 
 class Spot(NamedTuple):
@@ -186,7 +184,8 @@ def list_near(tree, surfaces, spot, stack, holders):
     """
     corners = corners_in(tree, surfaces, spot.face)
     o = barycentric(corners[0], corners[1], corners[2], spot.u, spot.v)
-    room = 4.0 * CORNER_ERROR * largest_of_three(*corners)
+    # What moves the point: rounding, and the step to the inner point.
+    room = 4.0 * CORNER_ERROR * largest_of_three(*corners) + _INWARDS * plane_of(corners)[1]
     low, high = sub(o, (room, room, room)), add(o, (room, room, room))
     query = _Around(o, room, low, high, surfaces, holders)
     return walk(tree, stack, query, np.int64(0), enter_around, _list_in)
@@ -199,22 +198,11 @@ def _list_in(tree, query, first, blocks, count):
         face = face_in(tree, slot)
         if face >= 0 and query.surfaces.ways.touches(query.surfaces, face):
             place = slot // BLOCK_FACES * BLOCK_WORDS + slot % BLOCK_FACES
-            held = _hold_sign(corners_at(tree, place), query.o, query.room)
+            corners = corners_at(tree, place)
+            held = hold_sign(corners, query.o, query.room) if box_holds(corners, query.o, query.room) else -1
             if held >= 0:
                 count = add_holder(query.holders, count, place, np.int64(face), held)
     return count, False
-
-
-@kernel
-def _hold_sign(corners, o, room):
-    """1 if a face contains a point, -1 if not, 0 if rounding could decide."""
-    if not box_holds(corners, o, room):
-        return -1
-    a, b, c = corners
-    n, (e0, e1, e2) = areas_at(corners, o)
-    reach = largest_of_three(sub(a, o), sub(b, o), sub(c, o))
-    error, least = _BESIDE * largest_component(n) * reach * (reach + room), minimum(e0, minimum(e1, e2))
-    return 1 if least > error else (-1 if least < -error else 0)
 
 
 @kernel

@@ -26,7 +26,6 @@ from renderer.numerics.vec3 import largest_component, largest_of_three, scale, s
 from renderer.trace.edge_signs import corners_at
 from renderer.trace.starts.anchor import from_anchor, one_of
 
-MISSES, IS_HIT, HOLDS = 0, 1, 2
 NONE = -1
 # A product of three vectors errs by less than 2^-94 of the products of their largest components, and the vector to a
 # corner by 2^-100 of the terms of its difference.
@@ -52,12 +51,10 @@ class SeenFace(NamedTuple):
 
 
 class Meeting(NamedTuple):
-    """A ray against a face: the kind of hit, t, u, v and their denominator, which has the sign of the determinant.
-
-    zeros  the bits of the corners whose weights are 0
+    """A ray against a face: t, NaN if the face contains the start or is missed; u, v and their denominator, which has
+    the sign of the determinant; and the bits of the corners whose weights are 0.
     """
 
-    kind: int
     t: float
     u: float
     v: float
@@ -182,7 +179,7 @@ def height_sign(face):
 
 @inlined
 def _none():
-    return Meeting(MISSES, 0.0, 0.0, 0.0, 1.0, 0)
+    return Meeting(np.nan, 0.0, 0.0, 1.0, 0)
 
 
 @inlined
@@ -249,7 +246,7 @@ def meet_face(face, anchor, d, slope_there, dz):
         return _none()
     t = quotient(dot_pairs(face.normal, face.a0), dot_pairs(face.normal, way))
     u, v, w = _weights(e0, e1, e2, slope, dz)
-    return Meeting(IS_HIT, maximum(t[0], 0.0) / face.factor, u, v, w, _zeros(s0, s1, s2))
+    return Meeting(maximum(t[0], 0.0) / face.factor, u, v, w, _zeros(s0, s1, s2))
 
 
 @kernel
@@ -260,7 +257,8 @@ def _held(face, anchor, d, dz):
         return _none()
     e0, e1, e2 = _corner_sign(face, 1, 2)[1], _corner_sign(face, 2, 0)[1], _corner_sign(face, 0, 1)[1]
     u, v, w = _weights(e0, e1, e2, slope_of(face, d), dz)
-    return Meeting(HOLDS, 0.0, u, v, w, zeros)
+    # rule: met-once
+    return Meeting(np.nan, u, v, w, zeros)
 
 
 @kernel

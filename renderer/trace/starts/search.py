@@ -29,11 +29,10 @@ from renderer.trace.leaf import resolved_hit
 from renderer.trace.single_ray import Found, SingleRay, enter_counted, prepare_single
 from renderer.trace.starts.anchor import anchor_of, from_anchor, rounded
 from renderer.trace.starts.arcs import arcs_of
-from renderer.trace.starts.around import box_holds, enter_around, is_beside
+from renderer.trace.starts.around import box_holds, enter_around, hold_sign
 from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, cone_of, holder, make_holders
 from renderer.trace.starts.fan import clear_fan, write_fan
 from renderer.trace.starts.meeting import (
-    IS_HIT,
     barycentrics_of,
     meet_face,
     seen_from,
@@ -106,7 +105,7 @@ def list_holders(tree, anchor, stack, holders, mask, ignored):
 
 @inlined
 def _may_hold(corners, query):
-    return box_holds(corners, query.o, query.room) and not is_beside(corners, query.o, query.room)
+    return box_holds(corners, query.o, query.room) and hold_sign(corners, query.o, query.room) >= 0
 
 
 @kernel
@@ -211,9 +210,8 @@ def near_bits(tree, block, departure, shear, seen):
 def meet_near(tree, place, departure, dz):
     """The ``FaceHit`` of a face tested from the exact start, and its ``Meeting.zeros``."""
     met = meet_face(seen_from(tree, place, departure.anchor), departure.anchor, departure.d, departure.slope, dz)
-    # rule: met-once
-    t = maximum(met.t / departure.unit, _LEAST_T) if met.kind == IS_HIT else np.nan
-    return FaceHit(t, met.u, met.v, met.w), met.zeros
+    t = met.t / departure.unit
+    return FaceHit(_LEAST_T if t < _LEAST_T else t, met.u, met.v, met.w), met.zeros
 
 
 @kernel

@@ -137,7 +137,7 @@ _CHANGES: dict[str, Change] = {
         "last-use-before", call("searchsorted", "np.searchsorted(_0, _1)")
     ),
     "textures of glTF files turn the other way": Rule("turned-with-v-up", element(1, "(-_[0], _[1], _[2])")),
-    "a face that holds a start is hit from there": Rule("met-once", compare(">=")),
+    "a face that holds a start is hit from there": Rule("met-once", argument(0, "0.0")),
     "faces beside a start are met from where it is rounded to": Rule("beside-start", value("np.int64(0)")),
     "a ray passes faces that coincide all at once": Rule("coincident-order", value("False")),
     "the foot of a wall does not part the face that it stands on": Rule("foot-of-wall", value("True")),
