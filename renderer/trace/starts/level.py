@@ -10,7 +10,7 @@ import numpy as np
 
 from renderer.jit.decorators import inlined, kernel
 from renderer.numerics.double_double import as_pairs, dot_pairs, quotient
-from renderer.numerics.simd import maximum, minimum
+from renderer.numerics.simd import maximum
 from renderer.numerics.vec3 import add, barycentric, cross, dot, largest_component, largest_of_three, length, sub
 from renderer.trace.edge_signs import corners_at
 from renderer.trace.intersect import face_in
