@@ -114,11 +114,15 @@ def test_a_bound_is_rounded_up_to_a_digit(viewer: Viewer) -> None:
 
 
 def value_at(viewer: Viewer, x: float, y: float) -> str:
-    """What the page says of a place of the window, once it does."""
+    """What the page says of a place of the window, once it does; until then it may say that of the one before."""
     viewer.page.mouse.move(x, y)
-    viewer.page.wait_for_timeout(10)
-    viewer.page.wait_for_function("() => !viewer.pointed.waiting && document.querySelector('#pointed').textContent")
-    viewer.page.wait_for_timeout(150)  # the pixel before stays until this one's value comes
+    viewer.page.wait_for_function(
+        """([x, y]) => {
+            const { at, waiting, said, seq } = viewer.pointed;
+            return at?.[0] === x && at[1] === y && !waiting && said === seq;
+        }""",
+        arg=[x, y],
+    )
     return viewer.page.inner_text("#pointed")
 
 

@@ -20,7 +20,7 @@ const SAID = {
 export class Pointed {
   // `viewer` is the page, `line` says the value.
   constructor(viewer, line) {
-    Object.assign(this, { viewer, line, at: null, seq: 0, asked: null, text: null, picture: null, waiting: null });
+    Object.assign(this, { viewer, line, at: null, seq: 0, said: null, asked: null, text: null, picture: null, waiting: null });
     for (const name of ["pointermove", "pointerdown"])
       viewer.stage.addEventListener(name, ({ clientX, clientY }) => this.move([clientX, clientY]));
     viewer.stage.addEventListener("pointerleave", () => this.move(null));
@@ -68,6 +68,7 @@ export class Pointed {
   show({ seq, scene, aov, value }) {
     this.refresh();
     if (seq !== this.seq || scene !== this.viewer.scene.id) return;
+    this.said = seq;
     this.line.textContent = value === null ? "No surface" : SAID[aov](value);
   }
 }
