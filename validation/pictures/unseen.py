@@ -240,6 +240,7 @@ def _fresnel(size: int) -> Iterator[Row]:
     asked = [(parts, 0.9 * passed(angle, 1.0, 1.5) ** 2, angle)
              for parts in _both_ways([ground, glass]) for angle in _ANGLES]  # fmt: skip
     yield _worst("a mirror below glass", asked, size)
+    yield _along_diagonals(16 * size)
 
 
 def _slab(low: float, high: float) -> Mesh:
@@ -259,12 +260,32 @@ def _worst(subject: str, asked: Sequence[tuple[Sequence[Part], float, float]], s
     return Row(subject, len(asked) * size * size, None, worst)
 
 
+# The middle of two slabs, and their width: there the last bit of a coordinate is 10^-8 of the width.
+_FAR, _WIDTH = (1e6, 0.0, 3e6), 0.01
+
+
+def _along_diagonals(count: int) -> Row:
+    """Slabs far from the origin, seen from above along both diagonals of the square in which they touch."""
+    x, y, z = _FAR
+    low, high = (x - _WIDTH / 2, z - _WIDTH / 2), (x + _WIDTH / 2, z + _WIDTH / 2)
+    parts = [(box((low[0], k - 1.0, low[1]), (high[0], float(k), high[1])), _of(1.5)) for k in (0, 1)]
+    worst, length = 0.0, 0.98 * math.sqrt(2.0) * _WIDTH
+    for across in ((1.0, 0.0, 1.0), (1.0, 0.0, -1.0)):
+        camera = OrthographicCamera(eye=(x, y + 9.0, z), target=_FAR, up=across, height=length / count)
+        found = _seen(scene_of(parts, camera, background=1.0), (count, 1))
+        worst = max(worst, float(np.abs(found / passed(0.0, 1.0, 1.5, 1.0) - 1.0).max()))
+    return Row("edges of two slabs, far from the origin", 2 * count, None, worst)
+
+
 def through(parts: Sequence[Part], angle: float, size: int) -> Floats:
     """The radiance along parallel rays at an angle from above, under a sky of 1."""
     t = math.radians(angle)
     target = np.array([0.3, 0.0, 0.2])
     eye = target + 20.0 * np.array([math.sin(t), math.cos(t), 0.0])
     camera = OrthographicCamera(eye=eye.tolist(), target=target.tolist(), up=(0.0, 0.0, 1.0), height=0.01)
-    scene = scene_of(parts, camera, background=1.0)
-    image = render(scene, resolution=(size, size), samples=1, max_depth=12, max_rays=UNLIMITED_RAYS, min_weight=0.0)
+    return _seen(scene_of(parts, camera, background=1.0), (size, size))
+
+
+def _seen(scene: Scene, resolution: tuple[int, int]) -> Floats:
+    image = render(scene, resolution=resolution, samples=1, max_depth=12, max_rays=UNLIMITED_RAYS, min_weight=0.0)
     return np.asarray(image.radiance[..., 0], np.float64)

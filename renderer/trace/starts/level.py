@@ -185,6 +185,7 @@ def list_near(tree, surfaces, spot, stack, holders):
     corners = corners_in(tree, surfaces, spot.face)
     o = barycentric(corners[0], corners[1], corners[2], spot.u, spot.v)
     # What moves the point: rounding, and the step to the inner point.
+    # rule: room-around-hit
     room = 4.0 * CORNER_ERROR * largest_of_three(*corners) + _INWARDS * plane_of(corners)[1]
     low, high = sub(o, (room, room, room)), add(o, (room, room, room))
     query = _Around(o, room, low, high, surfaces, holders)

@@ -239,6 +239,7 @@ _CHANGES: dict[str, Change] = {
     "another camera's eye is in the media of the scene's": Rule("media-at-eye", value("False")),
     "light passes an opaque face that glass touches": Rule("opaque-stops-light", drop),
     "bodies that touch have air between them": Rule("touching-bodies", compare(">=", "0")),
+    "points hit are where they are rounded to": Rule("room-around-hit", value("0.0")),
     "where bodies touch a ray comes from air": Rule("medium-of-crossing", element(2, "1.0")),
     "the sky upside down": Rule("sky-gradient", value("-_")),
     "a light of the sky missing": after("Sky.directional", lambda lights: lights[:-1]),
