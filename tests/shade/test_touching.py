@@ -205,7 +205,7 @@ class TestGlassOnGlass:
             np.testing.assert_allclose(image.radiance, passed(0, 1, 1.5, 1), rtol=1e-5)
 
     def test_on_an_edge_far_from_the_origin(self) -> None:
-        """Rounding there moves points by more than faces let through: straight down onto a diagonal of both."""
+        """Straight down onto a diagonal. There rounding moves points off the face that was hit."""
         (x, z), size = (1e6, 3e6), 0.01
         parts = [(box((x, y, z), (x + size, y + 1, z + size)), clear(1.5)) for y in (0, 1)]
         what = scene(*parts, eye=(x, 9, z), target=(x, 0, z), background=1.0)

@@ -16,7 +16,7 @@ from renderer.trace.edge_signs import corners_at
 from renderer.trace.intersect import face_in
 from renderer.trace.layout import BLOCK_FACES, BLOCK_WORDS
 from renderer.trace.starts.anchor import anchor_of
-from renderer.trace.starts.around import areas_at, box_holds, enter_around, hold_sign
+from renderer.trace.starts.around import areas_at, enter_around, hold_sign
 from renderer.trace.starts.cone import NUMBER, PLACE, ZEROS, add_holder, holder, put_holder
 from renderer.trace.starts.meeting import has_area, height_sign, seen_from, turn_sign, unit_direction
 from renderer.trace.starts.record import BARYCENTRIC, Start, corners_in
@@ -129,8 +129,8 @@ def _passed_at(tree, place, met):
 @kernel
 def _spot_of(tree, place, number, met):
     """The ``Spot`` of a member."""
-    _, around = areas_at(corners_at(tree, place), met.o)
-    e0, e1, e2 = maximum(around[0], 0.0), maximum(around[1], 0.0), maximum(around[2], 0.0)
+    e0, e1, e2 = areas_at(corners_at(tree, place), met.o)
+    e0, e1, e2 = maximum(e0, 0.0), maximum(e1, 0.0), maximum(e2, 0.0)
     whole = e0 + e1 + e2
     return Spot(number, e1 / whole, e2 / whole)
 
@@ -199,8 +199,7 @@ def _list_in(tree, query, first, blocks, count):
         face = face_in(tree, slot)
         if face >= 0 and query.surfaces.ways.touches(query.surfaces, face):
             place = slot // BLOCK_FACES * BLOCK_WORDS + slot % BLOCK_FACES
-            corners = corners_at(tree, place)
-            held = hold_sign(corners, query.o, query.room) if box_holds(corners, query.o, query.room) else -1
+            held = hold_sign(corners_at(tree, place), query.o, query.room)
             if held >= 0:
                 count = add_holder(query.holders, count, place, np.int64(face), held)
     return count, False

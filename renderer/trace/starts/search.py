@@ -29,7 +29,7 @@ from renderer.trace.leaf import resolved_hit
 from renderer.trace.single_ray import Found, SingleRay, enter_counted, prepare_single
 from renderer.trace.starts.anchor import anchor_of, from_anchor, rounded
 from renderer.trace.starts.arcs import arcs_of
-from renderer.trace.starts.around import box_holds, enter_around, hold_sign
+from renderer.trace.starts.around import enter_around, hold_sign
 from renderer.trace.starts.cone import NUMBER, PLACE, add_holder, cone_of, holder, make_holders
 from renderer.trace.starts.fan import clear_fan, write_fan
 from renderer.trace.starts.meeting import (
@@ -103,11 +103,6 @@ def list_holders(tree, anchor, stack, holders, mask, ignored):
     return walk(tree, stack, query, np.int64(0), enter_around, _add_holders)
 
 
-@inlined
-def _may_hold(corners, query):
-    return box_holds(corners, query.o, query.room) and hold_sign(corners, query.o, query.room) >= 0
-
-
 @kernel
 def _add_holders(tree, query, first, blocks, count):
     """List the faces of some blocks that contain an anchor."""
@@ -117,7 +112,7 @@ def _add_holders(tree, query, first, blocks, count):
     for block in range(first, first + blocks):
         for i in range(BLOCK_FACES):
             face, place = face_in(tree, block * BLOCK_FACES + i), block * BLOCK_WORDS + i
-            if face >= 0 and _may_hold(corners_at(tree, place), query):
+            if face >= 0 and hold_sign(corners_at(tree, place), query.o, query.room) >= 0:
                 zeros = zeros_if_held(seen_from(tree, place, query.anchor), query.anchor)
                 if zeros >= 0:
                     count = add_holder(query.holders, count, place, face, zeros)
