@@ -274,7 +274,7 @@ def _along_diagonals(count: int) -> Row:
         camera = OrthographicCamera(eye=(x, y + 9.0, z), target=_FAR, up=across, height=length / count)
         found = _seen(scene_of(parts, camera, background=1.0), (count, 1))
         worst = max(worst, float(np.abs(found / passed(0.0, 1.0, 1.5, 1.0) - 1.0).max()))
-    return Row("edges of two slabs, far from the origin", 2 * count, None, worst)
+    return Row("two slabs of one glass far from the origin, along diagonals", 2 * count, None, worst)
 
 
 def through(parts: Sequence[Part], angle: float, size: int) -> Floats:
