@@ -128,12 +128,11 @@ class Steps:
         """The ``SurfaceHit`` of the ray at t, at barycentrics of a face."""
         d, arrays, tree = ray.direction, self.arrays, self.prepared.tree
         stack, memory = np.empty(stack_size(tree.depth), np.int64), np.empty(HOLDERS_WORDS, np.int64)
-        together = together_of(tree.descriptor, arrays, spot, d, stack, memory)
+        media, beyond = np.array(ray.media, np.int64), np.zeros(self.media + SPARE, np.int64)
+        together = together_of(tree.descriptor, arrays, spot, d, media, stack, memory)
         surface = Surface(*surface_together_of(arrays, together, d))
         seen = self._seen(together.seen, surface, d, ray.width + arrays.spread * t)
-        inside, row = dot(d, seen.n_s) > 0.0, int(surface.material)
-        media, beyond = np.array(ray.media, np.int64), np.zeros(self.media + SPARE, np.int64)
-        change = Change(1.0, 1.0, 0)
+        inside, row, change = dot(d, seen.n_s) > 0.0, int(surface.material), Change(1.0, 1.0, 0)
         if passes_light_of(seen.arrays, seen.row):
             change = change_of(arrays, together, row, inside, media, beyond, memory)
         n = scale(seen.n_s, -1.0) if inside else seen.n_s

@@ -1,7 +1,8 @@
 """Crosses coinciding faces together, so that there is no air between bodies that touch.
 
 The ray goes from the medium before all of them to the medium after all; an opaque face among them stops it. Where media
-overlap, the body entered last counts; for bodies entered at one place, the one later in the scene.
+overlap, the body entered last counts; for bodies entered at one place, the one later in the scene. A ray within the
+plane in which bodies touch hits faces of several at one point: it leaves the body that it is in.
 """
 
 from typing import Any, NamedTuple
@@ -15,8 +16,8 @@ from renderer.numerics.simd import load, minimum, pointer, store
 from renderer.numerics.vec3 import dot
 from renderer.shade.surface import Look, left_from, look_at, material_of, scene_pointers
 from renderer.trace.spawn import Place
-from renderer.trace.starts.cone import NUMBER, PATH, holder, make_holders, put_holder
-from renderer.trace.starts.level import NO_MEMBER, Spot, list_members, list_near, member_spot
+from renderer.trace.starts.cone import NUMBER, PATH, PLACE, holder, make_holders, put_holder
+from renderer.trace.starts.level import NO_MEMBER, Spot, list_members, list_near, member_spot, point_of, spot_of
 from renderer.trace.trees import tree_pointers
 
 # Room for media that a ray enters at one place, beside those that it remembers.
@@ -72,20 +73,74 @@ def may_coincide(scene, face):
     return scene.has_touching and scene.ways.touches(scene, face)
 
 
-@inlined
-def faces_together(tree, scene, spot, d, stack, memory):
-    """The faces that a ray of direction d hits at a ``Spot``. ``stack`` and ``memory`` as for ``search.depart``; the
-    marks there last until the next search.
+@kernel
+def faces_together(tree, scene, spot, d, media, stack, memory):
+    """The faces that a ray of direction d in ``media`` hits at a ``Spot``. ``stack`` and ``memory`` as for
+    ``search.depart``; the marks there last until the next search.
     """
-    if may_coincide(scene, spot.face):
-        return _faces_together(tree, scene, spot, d, stack, memory)
-    return Together(spot, spot, spot, 0)
+    together = _faces_at(tree, scene, spot, d, stack, memory)
+    # rule: leave-own-body
+    if media.count > 0 and _leaves_other(scene, together, d, media, memory):
+        own = _own_spot(tree, scene, spot, d, media, stack, memory)
+        return _faces_at(tree, scene, own, d, stack, memory)
+    return together
+
+
+@inlined
+def _is_left(scene, spot, d):
+    return dot(d, look_at(scene, spot.face, spot.u, spot.v, d).n_s) > 0.0
+
+
+@inlined
+def _is_among(media, material):
+    """Whether a material is one of the media of a ray."""
+    found = False
+    for k in range(media.count):
+        found = found or load(media.rows, k) == material
+    return found
+
+
+@inlined
+def may_leave_other(scene, face, media):
+    """Whether a ray in ``media`` that hits a face alone may leave a body that it is not in."""
+    return media.count > 0 and not _is_among(media, material_of(scene, face))
+
+
+@inlined
+def _leaves_other(scene, together, d, media, memory):
+    """Whether a ray leaves a body that it is not in."""
+    seen, holders, other = together.seen, make_holders(memory), False
+    if together.count == 0:
+        clear = lets_through(scene.materials, material_of(scene, seen.face))
+        return clear and may_leave_other(scene, seen.face, media) and _is_left(scene, seen, d)
+    for k in range(together.count):
+        left = holder(holders, k, PATH) == _LEFT
+        other = other or (left and not _is_among(media, material_of(scene, holder(holders, k, NUMBER))))
+    return other
 
 
 @kernel
-def _faces_together(tree, scene, spot, d, stack, memory):
+def _own_spot(tree, scene, spot, d, media, stack, memory):
+    """The spot at the same place of the lowest face through which a ray leaves one of its ``media``; without such a
+    face the given one.
+    """
+    holders, best = make_holders(memory), spot
+    o = point_of(tree, scene, spot)
+    for k in range(list_near(tree, scene, spot, stack, holders, True) - 1, -1, -1):
+        number = holder(holders, k, NUMBER)
+        if _is_among(media, material_of(scene, number)):
+            own = spot_of(tree, holder(holders, k, PLACE), number, o)
+            best = own if _is_left(scene, own, d) else best
+    return best
+
+
+@kernel
+def _faces_at(tree, scene, spot, d, stack, memory):
+    """``faces_together`` for a ray in any media."""
+    if not may_coincide(scene, spot.face):
+        return Together(spot, spot, spot, 0)
     holders, opaque = make_holders(memory), NO_MEMBER
-    near = list_near(tree, scene, spot, stack, holders)
+    near = list_near(tree, scene, spot, stack, holders, False)
     if near < 2:
         return Together(spot, spot, spot, 0)
     members, met = list_members(tree, scene, spot, d, holders, near)
@@ -182,9 +237,11 @@ def _cross_all(scene, members, media, beyond, memory):
 
 
 @kernel
-def together_of(descriptor, arrays, spot, d, stack, memory):
-    """``faces_together``, for Python."""
-    return faces_together(tree_pointers(descriptor), scene_pointers(arrays), spot, d, pointer(stack), pointer(memory))
+def together_of(descriptor, arrays, spot, d, media, stack, memory):
+    """``faces_together``, for Python; ``media`` is an array."""
+    tree, scene, size = tree_pointers(descriptor), scene_pointers(arrays), len(media)
+    around = Media(pointer(media), size, size)
+    return faces_together(tree, scene, spot, d, around, pointer(stack), pointer(memory))
 
 
 @kernel

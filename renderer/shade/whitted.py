@@ -34,6 +34,7 @@ from renderer.shade.crossing import (
     faces_together,
     look_together,
     may_coincide,
+    may_leave_other,
     place_at,
 )
 from renderer.shade.direct import (
@@ -190,10 +191,15 @@ def _beyond(scratch, limit, i):
 
 
 @inlined
+def _media_of(bundle, i):
+    """The ``Media`` of ray ``i``."""
+    return Media(offset(bundle.media, i * bundle.limit), load(bundle.media_counts, i), bundle.limit)
+
+
+@inlined
 def _put_change(scene, bundle, scratch, i, together, inside, m):
     """Write the change of media of ray ``i`` at the surface that it hit, of material ``m``."""
-    surface = offset(scratch.surfaces, i * SURFACE_DOUBLES)
-    media = Media(offset(bundle.media, i * bundle.limit), load(bundle.media_counts, i), bundle.limit)
+    surface, media = offset(scratch.surfaces, i * SURFACE_DOUBLES), _media_of(bundle, i)
     change = cross(scene, together, m, inside, media, _beyond(scratch, bundle.limit, i), scratch.trace.holders)
     put3(surface, CHANGE, (change.n1, change.n2, float(change.left)))
     last = together.far
@@ -226,9 +232,9 @@ def _put_look(scene, bundle, scratch, i, together, look):
 
 @kernel
 def _meet_together(tree, scene, bundle, scratch, i, spot):
-    """Write what ray ``i`` sees at a ``Spot`` where faces may coincide. Returns the row of its material."""
-    d = row3(bundle.directions, i)
-    together = faces_together(tree, scene, spot, d, scratch.trace.packet_stack, scratch.trace.holders)
+    """``_meet_surface`` at a ``Spot`` where it may hit several faces."""
+    d, media = row3(bundle.directions, i), _media_of(bundle, i)
+    together = faces_together(tree, scene, spot, d, media, scratch.trace.packet_stack, scratch.trace.holders)
     store(scratch.found.face, i, together.seen.face)
     return _put_look(scene, bundle, scratch, i, together, look_together(scene, together, d))
 
@@ -238,7 +244,7 @@ def _meet_surface(tree, scene, bundle, scratch, i):
     """Write what ray ``i`` sees. Returns the row of its material."""
     found = scratch.found
     spot = Spot(load(found.face, i), load(found.u, i), load(found.v, i))
-    if may_coincide(scene, spot.face):
+    if may_coincide(scene, spot.face) or may_leave_other(scene, spot.face, _media_of(bundle, i)):
         return _meet_together(tree, scene, bundle, scratch, i, spot)
     look = look_at(scene, spot.face, spot.u, spot.v, row3(bundle.directions, i))
     return _put_look(scene, bundle, scratch, i, Together(spot, spot, spot, 0), look)

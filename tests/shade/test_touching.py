@@ -23,7 +23,7 @@ from renderer.scene.light import DirectionalLight
 from renderer.scene.needs import needs_of
 from renderer.scene.scene import Floor, Scene, SceneObject
 from renderer.trace.spawn import MITSUBA_EPSILON
-from validation.pictures.unseen import passed
+from validation.pictures.unseen import box_at, columns_at, passed
 
 pytestmark = pytest.mark.judges("Dielectric", "Phong", "PreparedScene.touching")
 
@@ -215,6 +215,30 @@ class TestGlassOnGlass:
             for other in (at, size - at):
                 path = ray_path(prepared, (x + at, 9, z + other), (0, -1, 0), 8)
                 assert sum(s.radiance[0] for s in path) == pytest.approx(passed(0, 1, 1.5, 1), rel=1e-6)
+
+
+ORIGIN, FAR = (0.0, 0.0, 0.0), (-241.3, 200.7, 786.6)
+
+
+@cases(
+    "axis, place, up, plate",
+    [
+        (ORIGIN, (-(2.0**-54), 0.0), False, False),
+        (ORIGIN, (-0.4865042554105199, 0.0), False, True),
+        (ORIGIN, (-0.4865042554105199, 0.0), True, True),
+        (FAR, (2.0**-45, 0.344010458076923), True, True),
+        (FAR, (2.0**-45, 0.5160156871153276), True, True),
+    ],
+)
+def test_within_the_planes_in_which_columns_touch(axis: Any, place: Any, up: bool, plate: bool) -> None:
+    """A ray leaves the columns that it entered."""
+    columns = list(columns_at(axis))
+    ground = [(box_at(axis, (-3, -1, -3), (3, 0, 3)), clear(1.5))] if plate else []
+    what = scene(*columns[:2], *ground, *columns[2:], eye=(0, 9, 0), background=1.0)
+    prepared = prepare_scene(what, needs_of(what, max_depth=8), "octree", threads=1)
+    height, way = (-9, 1) if up else (9, -1)
+    path = ray_path(prepared, np.add(axis, (place[0], height, place[1])), (0, way, 0), 8)
+    assert sum(s.radiance[0] for s in path) == pytest.approx(passed(0, 1, 1.5, 1), rel=1e-6)
 
 
 def other_diagonals(mesh: Mesh) -> Mesh:

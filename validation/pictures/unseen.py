@@ -6,7 +6,7 @@ through has a closed form.
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -241,6 +241,7 @@ def _fresnel(size: int) -> Iterator[Row]:
              for parts in _both_ways([ground, glass]) for angle in _ANGLES]  # fmt: skip
     yield _worst("a mirror below glass", asked, size)
     yield _along_diagonals(16 * size)
+    yield _within_planes(2 * size + 1)
 
 
 def _slab(low: float, high: float) -> Mesh:
@@ -275,6 +276,36 @@ def _along_diagonals(count: int) -> Row:
         found = _seen(scene_of(parts, camera, background=1.0), (count, 1))
         worst = max(worst, float(np.abs(found / passed(0.0, 1.0, 1.5, 1.0) - 1.0).max()))
     return Row("two slabs of one glass far from the origin, along diagonals", 2 * count, None, worst)
+
+
+# The axes of columns, and upwards in pictures, so that rays are exactly within the planes, and a rounding off them.
+_AXES = ((0.0, 0.0, 0.0), (0.3, -0.7, 1.1), (929.8, 831.9, 209.1), (-241.3, 200.7, 786.6), (437.3, 174.8, 99.9))
+_TURNS = ((1.0, 0.0, 3.0), (1.0, 0.0, 1.0), (2.0, 0.0, 1.0), (3.0, 0.0, -1.0))
+
+
+def _within_planes(size: int) -> Row:
+    """Columns of four materials around an axis, alone and on a plate, seen along it: a ray within the planes in which
+    they touch passes one of them.
+    """
+    known, errors = passed(0.0, 1.0, 1.5, 1.0), []
+    for axis, end, up in product(_AXES, (9.0, -9.0), _TURNS):
+        eye = (axis[0], axis[1] + end, axis[2])
+        camera = OrthographicCamera(eye=eye, target=axis, up=up, height=1.0)
+        plate, columns = (box_at(axis, (-3.0, -1.0, -3.0), (3.0, 0.0, 3.0)), _of(1.5)), list(columns_at(axis))
+        for parts in (columns, [*columns[:2], plate, *columns[2:]]):
+            found = _seen(scene_of(parts, camera, background=1.0), (size, size))
+            errors.append(float(np.abs(found / known - 1.0).max()))
+    return Row("rays within the planes in which columns touch", len(errors) * size * size, None, max(errors))
+
+
+def columns_at(axis: tuple[float, float, float]) -> Iterator[Part]:
+    """Four columns of indices that differ, but by less than anything shows."""
+    for k, (x, z) in enumerate(((0.0, 0.0), (-1.0, 0.0), (-1.0, -1.0), (0.0, -1.0))):
+        yield box_at(axis, (x, 0.0, z), (x + 1.0, 1.0, z + 1.0)), _of(1.5 + k * 2.0**-40)
+
+
+def box_at(axis: tuple[float, float, float], low: tuple[float, ...], high: tuple[float, ...]) -> Mesh:
+    return box(np.add(axis, low).tolist(), np.add(axis, high).tolist())
 
 
 def through(parts: Sequence[Part], angle: float, size: int) -> Floats:

@@ -92,14 +92,28 @@ def _anchor_at(met, inwards):
     return anchor_of(Start(met.corners, (u, v, 0.0), spot.face, BARYCENTRIC))
 
 
+@inlined
+def _precedes(a, b):
+    return a[0] < b[0] or (a[0] == b[0] and (a[1] < b[1] or (a[1] == b[1] and a[2] < b[2])))
+
+
+@inlined
+def _is_within(face, p, q, a, b):
+    """Whether a point lies on the inner side of the side of a face from p to q, which a and b are seen from the point.
+    On the side itself it belongs to one of two neighbours.
+    """
+    # rule: one-of-neighbours
+    return turn_sign(face, a, b) >= (0 if _precedes(p, q) else 1)
+
+
 @kernel
 def _holds_inner_point(tree, place, met):
     """Whether a face contains the inner point, exactly."""
-    face = seen_from(tree, place, _anchor_at(met, _INWARDS))
+    (p0, p1, p2), face = corners_at(tree, place), seen_from(tree, place, _anchor_at(met, _INWARDS))
     return has_area(face) and (
-        turn_sign(face, face.a1, face.a2) >= 0
-        and turn_sign(face, face.a2, face.a0) >= 0
-        and turn_sign(face, face.a0, face.a1) >= 0
+        _is_within(face, p1, p2, face.a1, face.a2)
+        and _is_within(face, p2, p0, face.a2, face.a0)
+        and _is_within(face, p0, p1, face.a0, face.a1)
     )
 
 
@@ -126,10 +140,17 @@ def _passed_at(tree, place, met):
     return quotient(dot_pairs(face.normal, face.a0), slope)[0] / face.factor
 
 
+@inlined
+def point_of(tree, surfaces, spot):
+    """The point of a spot, rounded."""
+    p0, p1, p2 = corners_in(tree, surfaces, spot.face)
+    return barycentric(p0, p1, p2, spot.u, spot.v)
+
+
 @kernel
-def _spot_of(tree, place, number, met):
-    """The ``Spot`` of a member."""
-    e0, e1, e2 = areas_at(corners_at(tree, place), met.o)
+def spot_of(tree, place, number, o):
+    """The ``Spot`` of a face, whose corners stand at ``place``, next to a point."""
+    e0, e1, e2 = areas_at(corners_at(tree, place), o)
     e0, e1, e2 = maximum(e0, 0.0), maximum(e1, 0.0), maximum(e2, 0.0)
     whole = e0 + e1 + e2
     return Spot(number, e1 / whole, e2 / whole)
@@ -140,33 +161,37 @@ def list_members(tree, surfaces, spot, d, holders, count):
     """The ``Members`` at a ``Spot`` hit by a ray of direction d, among those that ``list_near`` listed, at least the
     face of the spot; and the point, for ``member_spot``.
     """
-    corners = corners_in(tree, surfaces, spot.face)
-    o = barycentric(corners[0], corners[1], corners[2], spot.u, spot.v)
+    corners, o = corners_in(tree, surfaces, spot.face), point_of(tree, surfaces, spot)
     met = _SurfacePoint(corners, spot, o, unit_direction(d)[0])
-    count = _keep_members(tree, met, holders, count)
-    near, far, least, most, holds_own = NO_MEMBER, NO_MEMBER, 0.0, 0.0, False
+    # A face beside the members may contain the point too: rays leave beyond it, or they would hit it at once.
+    # rule: beyond-all-level
+    count = _keep_level(tree, met, holders, count)
+    if count < 2:
+        return Members(1, spot, spot), met
+    near, far, least, most = NO_MEMBER, NO_MEMBER, 0.0, 0.0
     for k in range(count):
         t, number = _passed_at(tree, holder(holders, k, PLACE), met), holder(holders, k, NUMBER)
-        holds_own = holds_own or number == spot.face
         if near == NO_MEMBER or t < least or (t == least and number < holder(holders, near, NUMBER)):
             near, least = k, t
         if far == NO_MEMBER or t > most or (t == most and number > holder(holders, far, NUMBER)):
             far, most = k, t
+    first, last = member_spot(tree, holders, near, spot, met), member_spot(tree, holders, far, spot, met)
+    count, holds_own = _keep_members(tree, met, holders, count)
     if count < 2 or not holds_own:
         return Members(1, spot, spot), met
-    return Members(count, member_spot(tree, holders, near, spot, met), member_spot(tree, holders, far, spot, met)), met
+    return Members(count, first, last), met
 
 
 @inlined
 def member_spot(tree, holders, k, spot, met):
     """The ``Spot`` of the k-th member; ``spot`` is that of the face hit."""
     number = holder(holders, k, NUMBER)
-    return spot if number == spot.face else _spot_of(tree, holder(holders, k, PLACE), number, met)
+    return spot if number == spot.face else spot_of(tree, holder(holders, k, PLACE), number, met.o)
 
 
 class _Around(NamedTuple):
-    """The search for touching faces at a point: the point, the room around it, the box of both, the surfaces that know
-    which faces touch, and the list of those found.
+    """The search for faces at a point: the point, the room around it, the box of both, the surfaces that know which
+    faces touch, whether others count too, and the list of those found.
     """
 
     o: Any
@@ -174,30 +199,30 @@ class _Around(NamedTuple):
     low: Any
     high: Any
     surfaces: Any
+    every: bool
     holders: Any
 
 
 @kernel
-def list_near(tree, surfaces, spot, stack, holders):
-    """List the touching faces that may contain a spot, as float64 can tell. Returns their number, usually 1. ``stack``
-    as in ``search.depart``.
+def list_near(tree, surfaces, spot, stack, holders, every):
+    """List the touching faces that may contain a spot, as float64 can tell, or every face. Returns their number,
+    usually 1. ``stack`` as in ``search.depart``.
     """
-    corners = corners_in(tree, surfaces, spot.face)
-    o = barycentric(corners[0], corners[1], corners[2], spot.u, spot.v)
+    corners, o = corners_in(tree, surfaces, spot.face), point_of(tree, surfaces, spot)
     # What moves the point: rounding, and the step to the inner point.
     # rule: room-around-hit
     room = 4.0 * CORNER_ERROR * largest_of_three(*corners) + _INWARDS * plane_of(corners)[1]
     low, high = sub(o, (room, room, room)), add(o, (room, room, room))
-    query = _Around(o, room, low, high, surfaces, holders)
+    query = _Around(o, room, low, high, surfaces, every, holders)
     return walk(tree, stack, query, np.int64(0), enter_around, _list_in)
 
 
 @inlined
 def _list_in(tree, query, first, blocks, count):
-    """List the touching faces of some blocks that may contain a point."""
+    """List the faces of some blocks that may contain a point."""
     for slot in range(first * BLOCK_FACES, (first + blocks) * BLOCK_FACES):
         face = face_in(tree, slot)
-        if face >= 0 and query.surfaces.ways.touches(query.surfaces, face):
+        if face >= 0 and (query.every or query.surfaces.ways.touches(query.surfaces, face)):
             place = slot // BLOCK_FACES * BLOCK_WORDS + slot % BLOCK_FACES
             held = hold_sign(corners_at(tree, place), query.o, query.room)
             if held >= 0:
@@ -205,15 +230,30 @@ def _list_in(tree, query, first, blocks, count):
     return count, False
 
 
+@inlined
+def _keep(holders, kept, k):
+    """Move the k-th holder to the place after those kept. Returns their number."""
+    for word in (PLACE, NUMBER, ZEROS):
+        put_holder(holders, kept, word, holder(holders, k, word))
+    return kept + 1
+
+
 @kernel
-def _keep_members(tree, met, holders, count):
-    """Keep only the listed faces that are members. Returns their number."""
+def _keep_level(tree, met, holders, count):
+    """Keep only the listed faces in the plane of the face hit. Returns their number."""
     kept = 0
     for k in range(count):
-        place, face = holder(holders, k, PLACE), holder(holders, k, NUMBER)
-        level = are_level(met.corners, corners_at(tree, place))
-        if level and (holder(holders, k, ZEROS) != 0 or _holds_inner_point(tree, place, met)):
-            put_holder(holders, kept, PLACE, place)
-            put_holder(holders, kept, NUMBER, face)
-            kept += 1
+        if are_level(met.corners, corners_at(tree, holder(holders, k, PLACE))):
+            kept = _keep(holders, kept, k)
     return kept
+
+
+@kernel
+def _keep_members(tree, met, holders, count):
+    """Keep only those that contain the inner point. Returns their number, and whether the face hit is among them."""
+    kept, holds_own = 0, False
+    for k in range(count):
+        if holder(holders, k, ZEROS) != 0 or _holds_inner_point(tree, holder(holders, k, PLACE), met):
+            holds_own = holds_own or holder(holders, k, NUMBER) == met.spot.face
+            kept = _keep(holders, kept, k)
+    return kept, holds_own
