@@ -58,7 +58,7 @@ def compiling(name: str, folder: str | None) -> Iterator[None]:
     """A context for compiling one kernel: logs it, and adds its time to ``compile_seconds``."""
     kept = f"once, kept in {folder}" if folder else "for this process only: no cache folder can be written"
     if _Clock.kernels == 0 and os.environ.get(QUIET_VARIABLE, "0") in ("", "0"):
-        _LOG.warning("renderer: compiling kernels, which takes up to a minute (%s)", kept)
+        _LOG.warning("renderer: compiling kernels, which can take a minute (%s)", kept)
     _LOG.info("compiling %s (%s)", name, kept)
     _Clock.kernels += 1
     _Clock.under_way += 1

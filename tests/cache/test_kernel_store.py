@@ -147,7 +147,7 @@ def test_a_folder_that_cannot_be_written_falls_back_to_the_users_own(package, tm
     nowhere = {"XDG_CACHE_HOME": str(tmp_path / "blocked")}
     for _ in range(2):
         assert " ".join(run(package, TELL + RUN, **nowhere)) == (
-            "renderer: compiling kernels, which takes up to a minute (for this process only: no cache folder can be "
+            "renderer: compiling kernels, which can take a minute (for this process only: no cache folder can be "
             "written) compiling answer (for this process only: no cache folder can be written) 27 0 1"
         )
 
