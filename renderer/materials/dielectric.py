@@ -38,7 +38,7 @@ class Dielectric(BaseMaterial):
     Bodies that touch have no air between them. A ray crosses faces that coincide at once, from the medium before all of
     them to the medium after all, and takes the colours of the face that is first in the scene. An opaque face stops it.
     Where bodies overlap, the medium is that of the body which the ray entered last; of those entered at one point, that
-    of the last in the scene.
+    of the last in the scene. A ray within the plane in which bodies touch leaves the body that it entered.
 
     Examples
     --------
