@@ -14,7 +14,16 @@ from renderer.numerics.vec3 import add, dot, normalized, scale, sub, times
 from renderer.picture.pack import media_around
 from renderer.picture.prepare import MediaRule, PreparedScene, arrays_for, media_limit
 from renderer.results.hits import Hits
-from renderer.shade.crossing import SPARE, Change, Together, change_of, place_at, surface_together_of, together_of
+from renderer.shade.crossing import (
+    SPARE,
+    Change,
+    Together,
+    change_of,
+    place_at,
+    place_beyond,
+    surface_together_of,
+    together_of,
+)
 from renderer.shade.direct import MOST_HOLES
 from renderer.shade.lights import aim_from
 from renderer.shade.looks import OWN_COLUMNS
@@ -129,7 +138,7 @@ class Steps:
         d, arrays, tree = ray.direction, self.arrays, self.prepared.tree
         stack, memory = np.empty(stack_size(tree.depth), np.int64), np.empty(HOLDERS_WORDS, np.int64)
         media, beyond = np.array(ray.media, np.int64), np.zeros(self.media + SPARE, np.int64)
-        together = together_of(tree.descriptor, arrays, spot, d, media, stack, memory)
+        together = together_of(tree.descriptor, arrays, spot, d, media, self.media, stack, memory)
         surface = Surface(*surface_together_of(arrays, together, d))
         seen = self._seen(together.seen, surface, d, ray.width + arrays.spread * t)
         inside, row, change = dot(d, seen.n_s) > 0.0, int(surface.material), Change(1.0, 1.0, 0)
@@ -189,7 +198,7 @@ class Steps:
             last, surface, place = Spot(*met.together.far), met.surface, met.place
             if last.face != int(met.place.face):
                 surface = surface_of(self.arrays, *last, d)
-                place = place_at(last, surface, d)
+                place = place_beyond(last, surface, d)
             children.append(self._child("refracted", ray, surface, place, through, times(ray.weight, k_t), met.beyond))
         return children
 

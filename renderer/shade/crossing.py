@@ -64,7 +64,16 @@ def came_from(n_g, d):
 @inlined
 def place_at(spot, surface, d):
     """The ``Place`` of rays that leave the ``Surface`` at a spot hit by a ray of direction d."""
-    return Place(float(spot.face), spot.u, spot.v, surface.slack, came_from(surface.n_g, d))
+    return Place(float(spot.face), spot.u, spot.v, surface.slack, came_from(surface.n_g, d), 0.0)
+
+
+@inlined
+def place_beyond(spot, surface, d):
+    """``place_at`` for rays that have crossed all the faces there together: the face of the spot is the last of them,
+    whichever there are.
+    """
+    # rule: beyond-all-level
+    return Place(float(spot.face), spot.u, spot.v, surface.slack, came_from(surface.n_g, d), float(spot.face + 1))
 
 
 @inlined
@@ -80,15 +89,10 @@ def faces_together(tree, scene, spot, d, media, stack, memory):
     """
     together = _faces_at(tree, scene, spot, d, stack, memory)
     # rule: leave-own-body
-    if media.count > 0 and _leaves_other(scene, together, d, media, memory):
+    if _some_leave_other(scene, together, d, media, memory):
         own = _own_spot(tree, scene, spot, d, media, stack, memory)
         return _faces_at(tree, scene, own, d, stack, memory)
     return together
-
-
-@inlined
-def _is_left(scene, spot, d):
-    return dot(d, look_at(scene, spot.face, spot.u, spot.v, d).n_s) > 0.0
 
 
 @inlined
@@ -101,36 +105,37 @@ def _is_among(media, material):
 
 
 @inlined
-def may_leave_other(scene, face, media):
-    """Whether a ray in ``media`` that hits a face alone may leave a body that it is not in."""
-    return media.count > 0 and not _is_among(media, material_of(scene, face))
+def leaves_other(scene, look, d, media):
+    """Whether a ray of direction d in ``media`` leaves a body that it is not in, through the face of a ``Look``."""
+    clear = media.limit > 0 and lets_through(scene.materials, look.material)
+    return clear and dot(d, look.n_s) > 0.0 and not _is_among(media, look.material)
 
 
 @inlined
-def _leaves_other(scene, together, d, media, memory):
-    """Whether a ray leaves a body that it is not in."""
+def _some_leave_other(scene, together, d, media, memory):
+    """``leaves_other`` for any of the faces that a ray crosses together."""
     seen, holders, other = together.seen, make_holders(memory), False
     if together.count == 0:
-        clear = lets_through(scene.materials, material_of(scene, seen.face))
-        return clear and may_leave_other(scene, seen.face, media) and _is_left(scene, seen, d)
+        return leaves_other(scene, look_at(scene, seen.face, seen.u, seen.v, d), d, media)
     for k in range(together.count):
         left = holder(holders, k, PATH) == _LEFT
         other = other or (left and not _is_among(media, material_of(scene, holder(holders, k, NUMBER))))
-    return other
+    return other and media.limit > 0
 
 
 @kernel
 def _own_spot(tree, scene, spot, d, media, stack, memory):
-    """The spot at the same place of the lowest face through which a ray leaves one of its ``media``; without such a
-    face the given one.
+    """The spot at the same place of the lowest face through which a ray leaves one of its ``media``; of a ray in none,
+    of the lowest face alone through which it enters a body. Without such a face the given spot.
     """
-    holders, best = make_holders(memory), spot
+    holders, best, outside = make_holders(memory), spot, media.count == 0
     o = point_of(tree, scene, spot)
     for k in range(list_near(tree, scene, spot, stack, holders, True) - 1, -1, -1):
         number = holder(holders, k, NUMBER)
-        if _is_among(media, material_of(scene, number)):
-            own = spot_of(tree, holder(holders, k, PLACE), number, o)
-            best = own if _is_left(scene, own, d) else best
+        own = spot_of(tree, holder(holders, k, PLACE), number, o)
+        look = look_at(scene, own.face, own.u, own.v, d)
+        fits = not may_coincide(scene, number) if outside else _is_among(media, look.material)
+        best = own if fits and (dot(d, look.n_s) > 0.0) != outside else best
     return best
 
 
@@ -237,10 +242,9 @@ def _cross_all(scene, members, media, beyond, memory):
 
 
 @kernel
-def together_of(descriptor, arrays, spot, d, media, stack, memory):
-    """``faces_together``, for Python; ``media`` is an array."""
-    tree, scene, size = tree_pointers(descriptor), scene_pointers(arrays), len(media)
-    around = Media(pointer(media), size, size)
+def together_of(descriptor, arrays, spot, d, media, limit, stack, memory):
+    """``faces_together``, for Python; ``media`` is an array, and ``limit`` the most that a ray remembers."""
+    tree, scene, around = tree_pointers(descriptor), scene_pointers(arrays), Media(pointer(media), len(media), limit)
     return faces_together(tree, scene, spot, d, around, pointer(stack), pointer(memory))
 
 

@@ -47,7 +47,7 @@ def begin_shadows(shadows):
 def place_of(surface):
     """The ``Place`` of a surface."""
     row = offset(surface, PLACE)
-    return Place(load(row, 0), load(row, 1), load(row, 2), load(row, 3), load(row, 4))
+    return Place(load(row, 0), load(row, 1), load(row, 2), load(row, 3), load(row, 4), 0.0)
 
 
 @inlined

@@ -32,10 +32,10 @@ from renderer.shade.crossing import (
     came_from,
     cross,
     faces_together,
+    leaves_other,
     look_together,
     may_coincide,
-    may_leave_other,
-    place_at,
+    place_beyond,
 )
 from renderer.shade.direct import (
     BOUND,
@@ -244,9 +244,12 @@ def _meet_surface(tree, scene, bundle, scratch, i):
     """Write what ray ``i`` sees. Returns the row of its material."""
     found = scratch.found
     spot = Spot(load(found.face, i), load(found.u, i), load(found.v, i))
-    if may_coincide(scene, spot.face) or may_leave_other(scene, spot.face, _media_of(bundle, i)):
+    if may_coincide(scene, spot.face):
         return _meet_together(tree, scene, bundle, scratch, i, spot)
-    look = look_at(scene, spot.face, spot.u, spot.v, row3(bundle.directions, i))
+    d = row3(bundle.directions, i)
+    look = look_at(scene, spot.face, spot.u, spot.v, d)
+    if leaves_other(scene, look, d, _media_of(bundle, i)):
+        return _meet_together(tree, scene, bundle, scratch, i, spot)
     return _put_look(scene, bundle, scratch, i, Together(spot, spot, spot, 0), look)
 
 
@@ -321,7 +324,7 @@ def _exit_at(scene, row, d):
     """The ``_Exit`` from the ``Spot`` in a row."""
     last = Spot(np.int64(load(row, 0)), load(row, 1), load(row, 2))
     met = surface_at(scene, last.face, last.u, last.v, d)
-    return _Exit(met.p, met.error, met.n_g, place_at(last, met, d))
+    return _Exit(met.p, met.error, met.n_g, place_beyond(last, met, d))
 
 
 @inlined

@@ -95,8 +95,8 @@ BOUNDED = OffsetRule(True, 0.0)
 
 
 class Place(NamedTuple):
-    """A hit at which a ray may start: the face, as float64, its barycentrics, the slack of rays from there, and the
-    side of n_g that the ray came from, 1 or -1.
+    """A hit at which a ray may start: the face, as float64, its barycentrics, the slack of rays from there, the side of
+    n_g that the ray came from, 1 or -1, and the first of the faces that coincide there, as of ``starts.record``.
     """
 
     face: float
@@ -104,6 +104,7 @@ class Place(NamedTuple):
     v: float
     slack: float
     came: float
+    pile: float
 
 
 class Facet(NamedTuple):
@@ -234,8 +235,7 @@ def put_start(row, place, n_g, w, d, rule):
     store(row, CODE, np.float64(code))
     store(row, ANCHOR, place.u)
     store(row, ANCHOR + 1, place.v)
-    # Of faces that coincide those from the first one on are passed: pictures cross all at once.
-    store(row, PILE, 0.0)
+    store(row, PILE, place.pile)
     for k in range(3):
         store(row, WAY + k, -d[k])
 

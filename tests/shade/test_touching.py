@@ -241,6 +241,28 @@ def test_within_the_planes_in_which_columns_touch(axis: Any, place: Any, up: boo
     assert sum(s.radiance[0] for s in path) == pytest.approx(passed(0, 1, 1.5, 1), rel=1e-6)
 
 
+@cases(
+    "origin, way, count",
+    [((0.5, -6.0, 0.5), (1, 13, 1), 4), ((-3.0, 0.5, 9.0), (0.5, 0, -1), 2), ((5.0, 0.5, 9.0), (-0.5, 0, -1), 2)],
+)
+def test_obliquely_through_an_edge_of_cubes_that_touch(origin: Any, way: Any, count: int) -> None:
+    """As through one body."""
+    cubes = [
+        box((x, 0, z), (x + 1, 1 if count == 2 else 2, z + 1)) for x, z in ((0, 0), (1, 0), (0, 1), (1, 1))[:count]
+    ]
+    parts = [(mesh, clear(1.5 + k * 2.0**-40)) for k, mesh in enumerate(cubes)]
+    seen = []
+    for bodies in (
+        parts,
+        parts[::-1],
+        [(box((0, 0, 0), np.max([mesh.vertices.max(0) for mesh in cubes], axis=0)), clear(1.5))],
+    ):
+        what = scene(*bodies, eye=(0, 9, 0), background=1.0)
+        prepared = prepare_scene(what, needs_of(what, max_depth=9), "octree", threads=1)
+        seen.append(sum(s.radiance[0] for s in ray_path(prepared, origin, way, 9)))
+    assert seen[:2] == pytest.approx([seen[2], seen[2]], rel=1e-6) and seen[2] > 0.5
+
+
 def other_diagonals(mesh: Mesh) -> Mesh:
     """A box of the same place whose squares are halved along their other diagonals."""
     middle = mesh.vertices.mean(axis=0) * [2, 0, 0]

@@ -242,6 +242,7 @@ def _fresnel(size: int) -> Iterator[Row]:
     yield _worst("a mirror below glass", asked, size)
     yield _along_diagonals(16 * size)
     yield _within_planes(2 * size + 1)
+    yield _through_edges(8 * size)
 
 
 def _slab(low: float, high: float) -> Mesh:
@@ -298,10 +299,26 @@ def _within_planes(size: int) -> Row:
     return Row("rays within the planes in which columns touch", len(errors) * size * size, None, max(errors))
 
 
-def columns_at(axis: tuple[float, float, float]) -> Iterator[Part]:
+def _through_edges(count: int) -> Row:
+    """Wide columns seen obliquely: rays enter where two of them touch, or pass within them through the edge of four."""
+    columns, errors = list(columns_at((0.0, 0.0, 0.0), 60.0)), []
+    half = math.sqrt(0.5)
+    ways = (((1.0, 0.0), (count, 1)), ((half, half), (1, count)))
+    for parts, angle, sign in product((columns, columns[::-1]), _ANGLES[1:], (9.0, -9.0)):
+        slope, known = sign * math.tan(math.radians(angle)), passed(angle, 1.0, 1.5, 1.0)
+        for (x, z), resolution in ways:
+            eye = (x * slope, 10.0, z * slope)
+            height = 3.0 / resolution[0]
+            camera = OrthographicCamera(eye=eye, target=(0.0, 1.0, 0.0), up=(x, 0.0, z), height=height)
+            found = _seen(scene_of(parts, camera, background=1.0), resolution)
+            errors.append(float(np.abs(found / known - 1.0).max()))
+    return Row("rays through the edges at which columns touch", len(errors) * count, None, max(errors))
+
+
+def columns_at(axis: tuple[float, float, float], width: float = 1.0) -> Iterator[Part]:
     """Four columns of indices that differ, but by less than anything shows."""
-    for k, (x, z) in enumerate(((0.0, 0.0), (-1.0, 0.0), (-1.0, -1.0), (0.0, -1.0))):
-        yield box_at(axis, (x, 0.0, z), (x + 1.0, 1.0, z + 1.0)), _of(1.5 + k * 2.0**-40)
+    for k, (x, z) in enumerate(((0.0, 0.0), (-width, 0.0), (-width, -width), (0.0, -width))):
+        yield box_at(axis, (x, 0.0, z), (x + width, 1.0, z + width)), _of(1.5 + k * 2.0**-40)
 
 
 def box_at(axis: tuple[float, float, float], low: tuple[float, ...], high: tuple[float, ...]) -> Mesh:

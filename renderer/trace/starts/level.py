@@ -163,10 +163,8 @@ def list_members(tree, surfaces, spot, d, holders, count):
     """
     corners, o = corners_in(tree, surfaces, spot.face), point_of(tree, surfaces, spot)
     met = _SurfacePoint(corners, spot, o, unit_direction(d)[0])
-    # A face beside the members may contain the point too: rays leave beyond it, or they would hit it at once.
-    # rule: beyond-all-level
-    count = _keep_level(tree, met, holders, count)
-    if count < 2:
+    count, holds_own = _keep_members(tree, met, holders, count)
+    if count < 2 or not holds_own:
         return Members(1, spot, spot), met
     near, far, least, most = NO_MEMBER, NO_MEMBER, 0.0, 0.0
     for k in range(count):
@@ -175,11 +173,7 @@ def list_members(tree, surfaces, spot, d, holders, count):
             near, least = k, t
         if far == NO_MEMBER or t > most or (t == most and number > holder(holders, far, NUMBER)):
             far, most = k, t
-    first, last = member_spot(tree, holders, near, spot, met), member_spot(tree, holders, far, spot, met)
-    count, holds_own = _keep_members(tree, met, holders, count)
-    if count < 2 or not holds_own:
-        return Members(1, spot, spot), met
-    return Members(count, first, last), met
+    return Members(count, member_spot(tree, holders, near, spot, met), member_spot(tree, holders, far, spot, met)), met
 
 
 @inlined
@@ -230,30 +224,16 @@ def _list_in(tree, query, first, blocks, count):
     return count, False
 
 
-@inlined
-def _keep(holders, kept, k):
-    """Move the k-th holder to the place after those kept. Returns their number."""
-    for word in (PLACE, NUMBER, ZEROS):
-        put_holder(holders, kept, word, holder(holders, k, word))
-    return kept + 1
-
-
-@kernel
-def _keep_level(tree, met, holders, count):
-    """Keep only the listed faces in the plane of the face hit. Returns their number."""
-    kept = 0
-    for k in range(count):
-        if are_level(met.corners, corners_at(tree, holder(holders, k, PLACE))):
-            kept = _keep(holders, kept, k)
-    return kept
-
-
 @kernel
 def _keep_members(tree, met, holders, count):
-    """Keep only those that contain the inner point. Returns their number, and whether the face hit is among them."""
+    """Keep only the listed faces that are members. Returns their number, and whether the face hit is one of them."""
     kept, holds_own = 0, False
     for k in range(count):
-        if holder(holders, k, ZEROS) != 0 or _holds_inner_point(tree, holder(holders, k, PLACE), met):
-            holds_own = holds_own or holder(holders, k, NUMBER) == met.spot.face
-            kept = _keep(holders, kept, k)
+        place, face = holder(holders, k, PLACE), holder(holders, k, NUMBER)
+        level = are_level(met.corners, corners_at(tree, place))
+        if level and (holder(holders, k, ZEROS) != 0 or _holds_inner_point(tree, place, met)):
+            holds_own = holds_own or face == met.spot.face
+            put_holder(holders, kept, PLACE, place)
+            put_holder(holders, kept, NUMBER, face)
+            kept += 1
     return kept, holds_own

@@ -19,7 +19,7 @@ def test_gates_and_rows_of_all_pictures(monkeypatch):
     monkeypatch.setattr(unseen, "from_within", lambda mesh: [next(own(mesh))])
     said = []
     rows, gates = unseen.check_unseen(Job(True, Thresholds(), Path(), said.append))
-    assert len(said) == unseen.steps() and len(rows) == len(gates) == 4 + 10 + 8
+    assert len(said) == unseen.steps() and len(rows) == len(gates) == 4 + 10 + 9
     assert all(gate.passed for gate in gates)
     assert all((row["wrong"] is None) != (row["error"] is None) and row["pixels"] > 0 for row in rows)
     assert "m.images.unseen" in (Path(page.__file__).parent / "templates" / "pictures.html").read_text("utf-8")
