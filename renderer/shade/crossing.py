@@ -15,15 +15,25 @@ from renderer.materials.registry import lets_through
 from renderer.numerics.simd import load, minimum, pointer, store
 from renderer.numerics.vec3 import dot
 from renderer.shade.surface import Look, left_from, look_at, material_of, scene_pointers
-from renderer.trace.spawn import Place
+from renderer.trace.edge_signs import corners_at
+from renderer.trace.spawn import LEVEL, Place
 from renderer.trace.starts.cone import NUMBER, PATH, PLACE, holder, make_holders, put_holder
-from renderer.trace.starts.level import NO_MEMBER, Spot, list_members, list_near, member_spot, point_of, spot_of
+from renderer.trace.starts.level import (
+    NO_MEMBER,
+    Spot,
+    are_level,
+    list_members,
+    list_near,
+    member_spot,
+    point_of,
+    spot_of,
+)
 from renderer.trace.trees import tree_pointers
 
 # Room for media that a ray enters at one place, beside those that it remembers.
 SPARE = 8
-# The marks of members, in their word PATH: a body is entered or left through it.
-_ENTERED, _LEFT = 1, 2
+# The marks of faces, in their word PATH: a body is entered or left through it, or neither.
+_ALONG, _ENTERED, _LEFT = 0, 1, 2
 
 
 class Together(NamedTuple):
@@ -126,17 +136,32 @@ def _some_leave_other(scene, together, d, media, memory):
 @kernel
 def _own_spot(tree, scene, spot, d, media, stack, memory):
     """The spot at the same place of the lowest face through which a ray leaves one of its ``media``; of a ray in none,
-    of the lowest face alone through which it enters a body. Without such a face the given spot.
+    of the lowest through which it enters a body and leaves none. Without such a face the given spot.
     """
-    holders, best, outside = make_holders(memory), spot, media.count == 0
-    o = point_of(tree, scene, spot)
-    for k in range(list_near(tree, scene, spot, stack, holders, True) - 1, -1, -1):
-        number = holder(holders, k, NUMBER)
-        own = spot_of(tree, holder(holders, k, PLACE), number, o)
+    holders, o = make_holders(memory), point_of(tree, scene, spot)
+    count = list_near(tree, scene, spot, stack, holders, True)
+    for k in range(count):
+        own = spot_of(tree, holder(holders, k, PLACE), holder(holders, k, NUMBER), o)
         look = look_at(scene, own.face, own.u, own.v, d)
-        fits = not may_coincide(scene, number) if outside else _is_among(media, look.material)
-        best = own if fits and (dot(d, look.n_s) > 0.0) != outside else best
-    return best
+        slope = dot(d, look.n_s)
+        put_holder(holders, k, PATH, _LEFT if slope > LEVEL else (_ENTERED if slope < -LEVEL else _ALONG))
+    for k in range(count):
+        place, number, way = holder(holders, k, PLACE), holder(holders, k, NUMBER), holder(holders, k, PATH)
+        if way == _LEFT and _is_among(media, material_of(scene, number)):
+            return spot_of(tree, place, number, o)
+        if way == _ENTERED and media.count == 0 and not _has_left_beside(tree, holders, count, place):
+            return spot_of(tree, place, number, o)
+    return spot
+
+
+@kernel
+def _has_left_beside(tree, holders, count, place):
+    """Whether one of the listed faces that are left lies in the plane of another face."""
+    found = False
+    for k in range(count):
+        level = are_level(corners_at(tree, place), corners_at(tree, holder(holders, k, PLACE)))
+        found = found or (level and holder(holders, k, PATH) == _LEFT)
+    return found
 
 
 @kernel

@@ -239,11 +239,13 @@ def test_within_the_planes_in_which_columns_touch(axis: Any, place: Any, up: boo
     height, way = (-9, 1) if up else (9, -1)
     path = ray_path(prepared, np.add(axis, (place[0], height, place[1])), (0, way, 0), 8)
     assert sum(s.radiance[0] for s in path) == pytest.approx(passed(0, 1, 1.5, 1), rel=1e-6)
+    for one in path:
+        np.testing.assert_allclose(np.subtract(one.end, axis)[[0, 2]], place, atol=1e-12)
 
 
 @cases(
     "origin, way, count",
-    [((0.5, -6.0, 0.5), (1, 13, 1), 4), ((-3.0, 0.5, 9.0), (0.5, 0, -1), 2), ((5.0, 0.5, 9.0), (-0.5, 0, -1), 2)],
+    [((0.5, -6.0, 0.5), (1, 13, 1), 4), ((-3.0, 0.5, 9.0), (0.5, 0, -1), 2), ((5.0, 1.0, -8.0), (-0.5, 0, 1), 2)],
 )
 def test_obliquely_through_an_edge_of_cubes_that_touch(origin: Any, way: Any, count: int) -> None:
     """As through one body."""
@@ -261,6 +263,31 @@ def test_obliquely_through_an_edge_of_cubes_that_touch(origin: Any, way: Any, co
         prepared = prepare_scene(what, needs_of(what, max_depth=9), "octree", threads=1)
         seen.append(sum(s.radiance[0] for s in ray_path(prepared, origin, way, 9)))
     assert seen[:2] == pytest.approx([seen[2], seen[2]], rel=1e-6) and seen[2] > 0.5
+
+
+LARGE = ((-2, -1, -2), (2, 2, 2))
+LEFT, RIGHT = ((-2, -1, -2), (0, 2, 0)), ((0, -1, -2), (2, 2, 0))
+HIGH, LOW = ((-2, 0, -2), (0, 2, 1)), ((0, -1, -2), (2, 1, 0))
+
+
+@cases(
+    "bodies, z, up",
+    [((LEFT, LARGE, RIGHT), -0.3, False), ((HIGH, LARGE, LOW), -0.3, True), ((LARGE, LEFT, RIGHT), 0.0, True)],
+)
+def test_within_the_plane_in_which_bodies_within_another_touch(bodies: Any, z: float, up: bool) -> None:
+    parts = [(box(*corners), clear(1.5 + k * 2.0**-40)) for k, corners in enumerate(bodies)]
+    what = scene(*parts, eye=(0, 9, 0), background=1.0)
+    prepared = prepare_scene(what, needs_of(what, max_depth=8), "octree", threads=1)
+    path = ray_path(prepared, (0, -9 if up else 9, z), (0, 1 if up else -1, 0), 8)
+    assert sum(s.radiance[0] for s in path) == pytest.approx(passed(0, 1, 1.5, 1), rel=1e-6)
+
+
+def test_the_first_of_faces_hit_together_is_in_the_picture() -> None:
+    """From below through the ground, on which glass stands."""
+    what = scene((cube(0.0), GLASS), (level(0.0), GROUND), eye=(-0.1, -9, 0.2), target=(-0.1, 0, 0.2), fov=0.1)
+    prepared = prepare_scene(what, needs_of(what, max_depth=3), "octree", threads=1)
+    seen = ray_path(prepared, (-0.1, -9, 0.2), (0, 1, 0), 3)[0].face
+    assert (picture(what, 1).face == seen).all() and seen >= 12
 
 
 def other_diagonals(mesh: Mesh) -> Mesh:
