@@ -1,5 +1,6 @@
 """Settings that all tests share."""
 
+import os
 import signal
 from pathlib import Path
 from types import ModuleType
@@ -18,6 +19,11 @@ timing.REST = 0.0
 
 # A job in the background inherits SIGINT ignored, and would hand that on to the processes that tests interrupt.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """Twice as many as processors: many tests wait for processes of their own."""
+    return 2 * (os.cpu_count() or 1)
 
 
 @pytest.fixture
