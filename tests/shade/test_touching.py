@@ -290,6 +290,16 @@ def test_the_first_of_faces_hit_together_is_in_the_picture() -> None:
     assert (picture(what, 1).face == seen).all() and seen >= 12
 
 
+def test_behind_an_open_sheet_only_faces_at_the_same_place_count() -> None:
+    """A ray leaves the lower sheet, which it never entered. The upper one, tilted, lies beyond it."""
+    lower = Mesh([[-1, 0, -1], [-1, 0, 1], [1, 0, 0]], [[0, 1, 2]])
+    upper = Mesh([[-1, -0.5, -1], [1, 1.1, 0], [-1, -0.5, 1]], [[1, 2, 0]])
+    for parts in ([(lower, GLASS), (upper, GLASS)], [(upper, GLASS), (lower, GLASS)]):
+        what = scene(*parts, eye=(0, 9, 0), background=1.0)
+        prepared = prepare_scene(what, needs_of(what, max_depth=2), "octree", threads=1)
+        assert ray_path(prepared, (-0.2, -9, 0.1), (0, 1, 0), 2)[0].end == pytest.approx((-0.2, 0, 0.1), abs=1e-12)
+
+
 def other_diagonals(mesh: Mesh) -> Mesh:
     """A box of the same place whose squares are halved along their other diagonals."""
     middle = mesh.vertices.mean(axis=0) * [2, 0, 0]

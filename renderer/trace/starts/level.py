@@ -212,14 +212,25 @@ def list_near(tree, surfaces, spot, stack, holders, every):
 
 
 @inlined
+def _may_pass(corners, o, room):
+    """Whether the plane of a face may pass within ``room`` of a point."""
+    n, side = plane_of(corners)
+    size, way = length(n), sub(o, corners[0])
+    room += CORNER_ERROR * largest_of_three(*corners)
+    return abs(dot(n, way)) <= 2.0 * room * size + CORNER_ERROR * side * side * largest_component(way)
+
+
+@inlined
 def _list_in(tree, query, first, blocks, count):
     """List the faces of some blocks that may contain a point."""
     for slot in range(first * BLOCK_FACES, (first + blocks) * BLOCK_FACES):
         face = face_in(tree, slot)
         if face >= 0 and (query.every or query.surfaces.ways.touches(query.surfaces, face)):
             place = slot // BLOCK_FACES * BLOCK_WORDS + slot % BLOCK_FACES
-            held = hold_sign(corners_at(tree, place), query.o, query.room)
-            if held >= 0:
+            corners = corners_at(tree, place)
+            held = hold_sign(corners, query.o, query.room)
+            # Touching faces are compared with the plane of the face hit later.
+            if held >= 0 and (not query.every or _may_pass(corners, query.o, query.room)):
                 count = add_holder(query.holders, count, place, np.int64(face), held)
     return count, False
 
