@@ -169,7 +169,7 @@ def _faces_at(tree, scene, spot, d, stack, memory):
     """``faces_together`` for a ray in any media."""
     if not may_coincide(scene, spot.face):
         return Together(spot, spot, spot, 0)
-    holders, opaque = make_holders(memory), NO_MEMBER
+    holders, opaque, clear = make_holders(memory), NO_MEMBER, 0
     near = list_near(tree, scene, spot, stack, holders, False)
     if near < 2:
         return Together(spot, spot, spot, 0)
@@ -181,9 +181,13 @@ def _faces_at(tree, scene, spot, d, stack, memory):
         at_ = member_spot(tree, holders, k, spot, met)
         look = look_at(scene, at_.face, at_.u, at_.v, d)
         put_holder(holders, k, PATH, _LEFT if dot(d, look.n_s) > 0.0 else _ENTERED)
+        clear += np.int64(lets_through(scene.materials, look.material))
         # rule: opaque-stops-light
         if not lets_through(scene.materials, look.material):
             opaque = k
+    if clear == 0:
+        # Of opaque faces alone the one that was hit is seen, however many are marked as touching.
+        return Together(spot, spot, spot, 0)
     seen = member_spot(tree, holders, 0 if opaque == NO_MEMBER else opaque, spot, met)
     return Together(seen, members.near, members.far, members.count if opaque == NO_MEMBER else 0)
 

@@ -73,6 +73,19 @@ def stacked(_):
     ]
 
 
+def crowded(seed):
+    """Boxes of all materials that touch and overlap, some of them mirrored, so that opaque faces coincide too."""
+    # At 10 and 11 opaque faces coincide of which a copy of the mesh elsewhere touches glass.
+    rng = np.random.default_rng(9 + seed)
+    return [
+        SceneObject(
+            mesh=box(), material=list(MATERIALS)[rng.integers(4)], scale=rng.integers(1, 4, 3) * rng.choice([-1, 1], 3),
+            translate=rng.integers(-2, 2, 3),
+        )
+        for _ in range(9)
+    ]  # fmt: skip
+
+
 @pytest.fixture
 def always(monkeypatch):
     monkeypatch.setattr(placed, "_LEAST", 1)
@@ -84,13 +97,13 @@ def same_planes(picture, expected):
         np.testing.assert_array_equal(getattr(picture, plane), getattr(expected, plane), err_msg=plane)
 
 
-@cases("make", [scattered, textured, stacked])
+@cases("make", [scattered, textured, stacked, crowded])
 @cases("settings", [{}, {"terminator": "soft", "glass_shadows": "clear", "max_depth": 4}])
 def test_the_picture_has_the_bits_of_that_of_the_merged_mesh(always, make, settings):
     for seed in range(3):
         objects = make(seed)
         box_ = objects[0].mesh
-        objects = [o.model_copy(update={"mesh": box_}) if make is stacked else o for o in objects]
+        objects = [o.model_copy(update={"mesh": box_}) if make in (stacked, crowded) else o for o in objects]
         scene = scene_of(objects).altered(materials=TEXTURED if make is textured else MATERIALS)
         ready = prepare(scene)
         assert isinstance(ready.built, BuiltScene)
