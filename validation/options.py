@@ -49,7 +49,7 @@ def make_parser() -> argparse.ArgumentParser:
         "--random", type=_seed, metavar="SEED",
         help="seed of the section random; default: 1",
     )  # fmt: skip
-    parser.add_argument("--defects", action="store_true", help="only inject the seeded defects; about half an hour")
+    parser.add_argument("--defects", action="store_true", help="only inject the seeded defects; one to two hours")
     parser.add_argument("--write-baseline", action="store_true", help="make the stored whole run the baseline")
     parser.add_argument("--record", type=Path, metavar="FILE", help="write the hits of MESH to a file, about 100 kB")
     parser.add_argument(

@@ -59,5 +59,5 @@ def absent(metrics: Mapping[str, Any]) -> str:
     for part, reason in metrics["left_out"].items():
         titles.setdefault(reason, []).append(PARTIALS[part].title)
     if "defects" not in metrics:
-        titles["no run is stored; python -m validation --defects makes one in half an hour"] = ["seeded defects"]
+        titles["no run is stored; python -m validation --defects makes one in one to two hours"] = ["seeded defects"]
     return "; ".join(f"{', '.join(names)} ({reason})" for reason, names in titles.items())

@@ -88,7 +88,7 @@ def test_no_section_is_empty_and_what_did_not_run_is_one_line(metrics: dict[str,
     (line,) = re.findall(r'id="absent">(.*?)</p>', page)
     assert line == (
         "Not in this run: Pictures, Queries, Studies, Stability, Random input, Promises, Efficiency (not named by "
-        "--only); seeded defects (no run is stored; python -m validation --defects makes one in half an hour)."
+        "--only); seeded defects (no run is stored; python -m validation --defects makes one in one to two hours)."
     )
     assert 'id="absent"' not in drawn(metrics, tmp_path, defects=DEFECTS)
 
