@@ -1,6 +1,5 @@
 """Settings that all tests share."""
 
-import os
 import signal
 from pathlib import Path
 from types import ModuleType
@@ -8,6 +7,7 @@ from types import ModuleType
 import pytest
 from hypothesis import settings
 
+from renderer.system.threads import available_threads
 from validation import timing
 
 # The same examples on every machine; no deadline, because a first call compiles.
@@ -23,7 +23,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 def pytest_xdist_auto_num_workers() -> int:
     """Twice as many as processors: many tests wait for processes of their own."""
-    return 2 * (os.cpu_count() or 1)
+    return 2 * available_threads()
 
 
 @pytest.fixture

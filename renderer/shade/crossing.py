@@ -74,7 +74,7 @@ def came_from(n_g, d):
 @inlined
 def place_at(spot, surface, d):
     """The ``Place`` of rays that leave the ``Surface`` at a spot hit by a ray of direction d."""
-    return Place(float(spot.face), spot.u, spot.v, surface.slack, came_from(surface.n_g, d), 0.0)
+    return _place(spot, surface, d, 0.0)
 
 
 @inlined
@@ -83,7 +83,12 @@ def place_beyond(spot, surface, d):
     whichever there are.
     """
     # rule: beyond-all-level
-    return Place(float(spot.face), spot.u, spot.v, surface.slack, came_from(surface.n_g, d), float(spot.face + 1))
+    return _place(spot, surface, d, float(spot.face + 1))
+
+
+@inlined
+def _place(spot, surface, d, pile):
+    return Place(float(spot.face), spot.u, spot.v, surface.slack, came_from(surface.n_g, d), pile)
 
 
 @inlined
@@ -116,8 +121,10 @@ def _is_among(media, material):
 
 @inlined
 def leaves_other(scene, look, d, media):
-    """Whether a ray of direction d in ``media`` leaves a body that it is not in, through the face of a ``Look``."""
-    clear = media.limit > 0 and lets_through(scene.materials, look.material)
+    """Whether a ray of direction d in ``media`` leaves a body that it is not in, through the face of a ``Look``; never
+    where no bodies touch, or each face is crossed by itself.
+    """
+    clear = scene.has_touching and media.limit > 0 and lets_through(scene.materials, look.material)
     return clear and dot(d, look.n_s) > 0.0 and not _is_among(media, look.material)
 
 
@@ -169,7 +176,7 @@ def _faces_at(tree, scene, spot, d, stack, memory):
     """``faces_together`` for a ray in any media."""
     if not may_coincide(scene, spot.face):
         return Together(spot, spot, spot, 0)
-    holders, opaque, clear = make_holders(memory), NO_MEMBER, 0
+    holders, opaque, clear = make_holders(memory), NO_MEMBER, False
     near = list_near(tree, scene, spot, stack, holders, False)
     if near < 2:
         return Together(spot, spot, spot, 0)
@@ -181,11 +188,12 @@ def _faces_at(tree, scene, spot, d, stack, memory):
         at_ = member_spot(tree, holders, k, spot, met)
         look = look_at(scene, at_.face, at_.u, at_.v, d)
         put_holder(holders, k, PATH, _LEFT if dot(d, look.n_s) > 0.0 else _ENTERED)
-        clear += np.int64(lets_through(scene.materials, look.material))
+        through = lets_through(scene.materials, look.material)
+        clear = clear or through
         # rule: opaque-stops-light
-        if not lets_through(scene.materials, look.material):
+        if not through:
             opaque = k
-    if clear == 0:
+    if not clear:
         # Of opaque faces alone the one that was hit is seen, however many are marked as touching.
         return Together(spot, spot, spot, 0)
     seen = member_spot(tree, holders, 0 if opaque == NO_MEMBER else opaque, spot, met)

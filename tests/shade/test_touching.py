@@ -294,8 +294,9 @@ def test_behind_an_open_sheet_only_faces_at_the_same_place_count() -> None:
     """A ray leaves the lower sheet, which it never entered. The upper one, tilted, lies beyond it."""
     lower = Mesh([[-1, 0, -1], [-1, 0, 1], [1, 0, 0]], [[0, 1, 2]])
     upper = Mesh([[-1, -0.5, -1], [1, 1.1, 0], [-1, -0.5, 1]], [[1, 2, 0]])
+    elsewhere = [(box((9, y, 9), (10, y + 1, 10)), WATER) for y in (0, 1)]  # they touch
     for parts in ([(lower, GLASS), (upper, GLASS)], [(upper, GLASS), (lower, GLASS)]):
-        what = scene(*parts, eye=(0, 9, 0), background=1.0)
+        what = scene(*parts, *elsewhere, eye=(0, 9, 0), background=1.0)
         prepared = prepare_scene(what, needs_of(what, max_depth=2), "octree", threads=1)
         assert ray_path(prepared, (-0.2, -9, 0.1), (0, 1, 0), 2)[0].end == pytest.approx((-0.2, 0, 0.1), abs=1e-12)
 
@@ -384,6 +385,14 @@ class TestOneAnswer:
         two = [(slab(0, 1), clear(1.5)), (slab(1, 2), clear(1.5))]
         image = through(50, *two, offset="mitsuba")
         assert np.abs(image.radiance - passed(50, 1, 1.5, 1)).max() > 0.01 and MITSUBA_EPSILON > 0.0
+
+    def test_at_an_edge_too(self) -> None:
+        """There a ray comes from outside upon the face in which two cubes touch, and by our offset enters another."""
+        eye, way = (-3.0, 0.5, 9.0), (0.5, 0.0, -1.0)
+        cubes = [(box((x, 0, 0), (x + 1, 1, 1)), clear(1.5 + x * 2.0**-40)) for x in (0, 1)]
+        what = scene(*cubes, eye=eye, target=np.add(eye, way), fov=1e-3)
+        hit = prepare_scene(what, needs_of(what), "octree", threads=1).octree.closest_hit(eye, way).face
+        assert picture(what, 1, offset="mitsuba").face[0, 0] == hit != picture(what, 1).face[0, 0]
 
 
 class TestTouchingFaces:

@@ -253,12 +253,16 @@ def _of(index: float) -> Material:
     return Dielectric(ior=index, reflectance=0.0)
 
 
+def _error(found: Floats, known: float) -> float:
+    """The largest relative error."""
+    return float(np.abs(found / known - 1.0).max())
+
+
 def _worst(subject: str, asked: Sequence[tuple[Sequence[Part], float, float]], size: int) -> Row:
     """The largest relative error of pictures with one known radiance each."""
     worst = 0.0
     for parts, known, angle in asked:
-        found = through(parts, angle, size)
-        worst = max(worst, float(np.abs(found / known - 1.0).max()))
+        worst = max(worst, _error(through(parts, angle, size), known))
     return Row(subject, len(asked) * size * size, None, worst)
 
 
@@ -275,7 +279,7 @@ def _along_diagonals(count: int) -> Row:
     for across in ((1.0, 0.0, 1.0), (1.0, 0.0, -1.0)):
         camera = OrthographicCamera(eye=(x, y + 9.0, z), target=_FAR, up=across, height=length / count)
         found = _seen(scene_of(parts, camera, background=1.0), (count, 1))
-        worst = max(worst, float(np.abs(found / passed(0.0, 1.0, 1.5, 1.0) - 1.0).max()))
+        worst = max(worst, _error(found, passed(0.0, 1.0, 1.5, 1.0)))
     return Row("two slabs of one glass far from the origin, along diagonals", 2 * count, None, worst)
 
 
@@ -294,8 +298,7 @@ def _within_planes(size: int) -> Row:
         camera = OrthographicCamera(eye=eye, target=axis, up=up, height=1.0)
         plate, columns = (box_at(axis, (-3.0, -1.0, -3.0), (3.0, 0.0, 3.0)), _of(1.5)), list(columns_at(axis))
         for parts in (columns, [*columns[:2], plate, *columns[2:]]):
-            found = _seen(scene_of(parts, camera, background=1.0), (size, size))
-            errors.append(float(np.abs(found / known - 1.0).max()))
+            errors.append(_error(_seen(scene_of(parts, camera, background=1.0), (size, size)), known))
     return Row("rays within the planes in which columns touch", len(errors) * size * size, None, max(errors))
 
 
@@ -304,14 +307,13 @@ def _through_edges(count: int) -> Row:
     columns, errors = list(columns_at((0.0, 0.0, 0.0), 60.0)), []
     half = math.sqrt(0.5)
     ways = (((1.0, 0.0), (count, 1)), ((half, half), (1, count)))
-    for parts, angle, sign in product((columns, columns[::-1]), _ANGLES[1:], (9.0, -9.0)):
-        slope, known = sign * math.tan(math.radians(angle)), passed(angle, 1.0, 1.5, 1.0)
+    for parts, angle, turned in product((columns, columns[::-1]), _ANGLES[1:], (9.0, -9.0)):
+        aside, known = turned * math.tan(math.radians(angle)), passed(angle, 1.0, 1.5, 1.0)
         for (x, z), resolution in ways:
-            eye = (x * slope, 10.0, z * slope)
-            height = 3.0 / resolution[0]
-            camera = OrthographicCamera(eye=eye, target=(0.0, 1.0, 0.0), up=(x, 0.0, z), height=height)
-            found = _seen(scene_of(parts, camera, background=1.0), resolution)
-            errors.append(float(np.abs(found / known - 1.0).max()))
+            camera = OrthographicCamera(
+                eye=(x * aside, 10.0, z * aside), target=(0.0, 1.0, 0.0), up=(x, 0.0, z), height=3.0 / resolution[0]
+            )
+            errors.append(_error(_seen(scene_of(parts, camera, background=1.0), resolution), known))
     return Row("rays through the edges at which columns touch", len(errors) * count, None, max(errors))
 
 

@@ -68,7 +68,7 @@ def plane_of(corners):
 
 @kernel
 def _is_below(p, q, error):
-    """Whether the corners of q lie in the plane of p, whose corners are off by ``error``."""
+    """Whether the points q lie in the plane of p, whose corners are off by ``error``."""
     n, side = plane_of(p)
     size, level = length(n), True
     for a in q:
@@ -212,15 +212,6 @@ def list_near(tree, surfaces, spot, stack, holders, every):
 
 
 @inlined
-def _may_pass(corners, o, room):
-    """Whether the plane of a face may pass within ``room`` of a point."""
-    n, side = plane_of(corners)
-    size, way = length(n), sub(o, corners[0])
-    room += CORNER_ERROR * largest_of_three(*corners)
-    return abs(dot(n, way)) <= 2.0 * room * size + CORNER_ERROR * side * side * largest_component(way)
-
-
-@inlined
 def _list_in(tree, query, first, blocks, count):
     """List the faces of some blocks that may contain a point."""
     for slot in range(first * BLOCK_FACES, (first + blocks) * BLOCK_FACES):
@@ -230,7 +221,8 @@ def _list_in(tree, query, first, blocks, count):
             corners = corners_at(tree, place)
             held = hold_sign(corners, query.o, query.room)
             # Touching faces are compared with the plane of the face hit later.
-            if held >= 0 and (not query.every or _may_pass(corners, query.o, query.room)):
+            error = query.room + CORNER_ERROR * largest_of_three(*corners)
+            if held >= 0 and (not query.every or _is_below(corners, (query.o,), error)):
                 count = add_holder(query.holders, count, place, np.int64(face), held)
     return count, False
 

@@ -142,10 +142,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for row in measure(mesh, systems, options.rays, lambda _: None, [KINDS[name] for name in options.only]):
         print(f"{row['mesh']}: {title(row['family'], row['query'])}, {'all agree' if row['agree'] else 'DISAGREE'}")
         for name, c in row["contenders"].items():
-            one, times = row["ratios_one_thread"].get(name), ""
-            if name != OURS:
-                alike = f"ours is {row['ratios'][name]:.2f} times as fast"
-                times = alike if one is None else f"ours on one thread is {one:.2f} times as fast"
+            times = f"ours is {row['ratios'][name]:.2f} times as fast" if name != OURS else ""
+            if (one := row["ratios_one_thread"].get(name)) is not None:
+                times = f"ours on one thread is {one:.2f} times as fast"
             print(f"  {name:16} {c['mrays']:10.4f} million a second, {c['differing']} of {c['rays']} differ  {times}")
     for name, how in missing.items():
         print(f"not measured: {name}; {how}")

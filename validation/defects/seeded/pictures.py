@@ -241,7 +241,7 @@ _CHANGES: dict[str, Change] = {
     "bodies that touch have air between them": Rule("touching-bodies", compare(">=", "0")),
     "points hit are where they are rounded to": Rule("room-around-hit", value("0.0")),
     "a point on an edge is in both faces": Rule("one-of-neighbours", choice(otherwise="0")),
-    "a ray that leaves bodies hits the next at once": Rule("beyond-all-level", argument(5, "0.0")),
+    "a ray that leaves bodies hits the next at once": Rule("beyond-all-level", argument(3, "0.0")),
     "a ray leaves a body that it is not in": Rule("leave-own-body", value("False")),
     "where bodies touch a ray comes from air": Rule("medium-of-crossing", element(2, "1.0")),
     "the sky upside down": Rule("sky-gradient", value("-_")),
